@@ -167,7 +167,10 @@ def read_sizes(scene: Scene, given: Mapping[str, object] | None) -> dict[str, tu
 
 
 class Best(NamedTuple):
-    """Best point, SI by number, and how it was found; levels: values of the objectives, in units of the scale."""
+    """Best point, SI by number, and how it was found; levels: values of the objectives, in units of the scale.
+
+    unsolved: boxes whose solve gave neither an optimum nor that there is none.
+    """
 
     point: Mapping[str, float] | None
     admissible: int | None
@@ -176,6 +179,7 @@ class Best(NamedTuple):
     rests: str
     levels: tuple[float, ...] = ()
     reaching: int | None = None
+    unsolved: int = 0
 
 
 def _check_goals(lattice: Lattice, nominal: Solution, answer: Solution) -> None:
@@ -357,19 +361,20 @@ def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
     best: tuple[float, ...] | None = None
     point: Mapping[str, float] | None = None
     best_answer: Solution | None = None
-    boxes, rests = (
-        0,
-        "each box of sizes was solved without them from its neighbour, to an optimum nearby",
-    )
+    boxes, unsolved = 0, 0
+    rests = "each box of sizes was solved without them from its neighbour, to an optimum nearby"
 
     def take(ends: Ends, near: Solution) -> None:
-        nonlocal best, point, boxes, best_answer
+        nonlocal best, point, boxes, best_answer, unsolved
         boxes += 1
         scene = lattice.within({k: (lattice.sizes[k][a], lattice.sizes[k][b]) for k, (a, b) in ends.items()})
         start = [near.point] if near.point else []
-        step = f"box {boxes} of sizes, {MOST_BOXES} at most; {_progress(lattice, best_answer, near)}"
+        step = f"sizes: box {boxes} of up to {MOST_BOXES}; {_progress(lattice, best_answer, near)}"
         answer = solve(replace(lattice.task.at(step), scene=scene, near=start))
+        if answer.status not in ("optimal", "infeasible"):
+            answer = solve(replace(lattice.task.at(step), scene=scene))
         if answer.status != "optimal" or answer.point is None:
+            unsolved += answer.status != "infeasible"
             return
         program = lattice.job.program(scene, lattice.task.target)
         rescaled = zip(objectives(program, answer.point.x), program.objectives, lattice.program.objectives, strict=True)
@@ -396,7 +401,7 @@ def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
         gap = next(b - a for a, b in zip(queue[0][0], best, strict=True) if b > a)
     elif best is None and queue:
         gap = math.inf
-    return Best(point, None, boxes, gap, rests)
+    return Best(point, None, boxes, gap, rests, unsolved=unsolved)
 
 
 def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
@@ -408,12 +413,17 @@ def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
         UnitFormatter(lattice.scene),
         list(dict.fromkeys(level.figure for level in lattice.program.objectives)),
     )
+    figures = ", ".join(
+        f"{name} {formatter.shown(name, (best or bound).figures[name] or 0.0, 6)}" for name in names
+    )
     if best is None:
-        return "no sizes found yet"
-    figures = ", ".join(f"{name} {formatter.shown(name, best.figures[name] or 0.0, 6)}" for name in names)
+        return f"none found yet, at best {figures}"
     gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
     sizes = {level.figure: level.scale ** (1 / level.power) for level in lattice.program.objectives}
-    gap_texts = [f"{name} {formatter.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]]
+    label = {name: f"{name} " if len(names) > 1 else "" for name in names}
+    gap_texts = [
+        f"{label[name]}{formatter.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]
+    ]
     return f"best {figures}; gap {', '.join(gap_texts) or '0'}"
 
 
@@ -453,6 +463,9 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
     if best.boxes and best.gap:
         texts.append(f"At most {100 * best.gap:.2g} % better may exist on the lattice of {lattice.points} points")
         texts[-1] += f": {best.boxes} boxes were solved."
+    elif best.unsolved:
+        text = f"Better sizes may exist among the {lattice.points} points of the lattice: {best.unsolved} of {best.boxes}"
+        texts.append(f"{text} boxes of sizes could not be solved.")
     else:
         counts = "" if best.admissible is None else f", {best.admissible} of which keep all limits"
         counts += f" and {best.reaching} reach the goal" if best.reaching != best.admissible else ""
@@ -472,7 +485,7 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
 def _without_sizes(lattice: Lattice, nominal: Solution, best: Best) -> Solution:
     """Answer without a certificate: no admissible point was found."""
     helps = "Take smaller steps or wider bounds; the given design is the optimum without sizes."
-    if best.gap:
+    if best.gap or best.unsolved:
         status = "failed"
         problem = f"No admissible sizes were found in {best.boxes} boxes of a lattice of {lattice.points} points."
     else:

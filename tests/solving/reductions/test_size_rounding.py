@@ -5,6 +5,7 @@ Reference values: all 1 197 735 points read apart, each with the counterweight t
 
 import json
 import re
+from dataclasses import replace
 
 import pytest
 
@@ -14,6 +15,9 @@ from loomopt.interface.files import answer_file
 from loomopt.interface.text import answers
 from loomopt.jobs import registry
 from loomopt.solving import engine
+from loomopt.solving.nlp.point import Settings
+from loomopt.solving.optimum import Task
+from loomopt.solving.reductions import size_rounding
 from loomopt.solving.reductions.size_rounding import SizeRounding, read_sizes
 
 
@@ -144,14 +148,39 @@ def test_progress_says_boxes_best_and_gap_through_every_solve():
     texts: list[str] = []
     scene = registry.load("beatup").update({"bounds.l1": "30 mm", "bounds.l4": "167 mm"})
     lo.solve(scene, "pulse", round_to={"l2": "2 mm", "l3": "2 mm"}, on_step=texts.append)
-    boxes = [line for line in texts if line.startswith("box ")]
+    boxes = [line for line in texts if line.startswith("sizes: box ")]
     assert boxes
-    assert all("of sizes, 600 at most; " in line for line in boxes)
-    assert any("no sizes found yet" in line for line in boxes)
-    assert any(re.search(r"; best pulse_rms [\d.]+ N\*m; gap pulse_rms [\d.e-]+ N\*m", line) for line in boxes)
+    assert all(re.match(r"sizes: box \d+ of up to 600; ", line) for line in boxes)
+    assert any(re.search(r"; none found yet, at best pulse_rms [\d.]+ N\*m", line) for line in boxes)
+    found = [line for line in boxes if re.search(r"; best pulse_rms [\d.]+ N\*m; gap [\d.e-]+ N\*m", line)]
+    assert found
+    assert max(line.index("gap ") + 12 for line in found) < 79, "a terminal of 80 columns shows the gap"
     first, last = texts.index(boxes[0]), len(texts) - texts[::-1].index(boxes[-1])
     assert texts[first:last] == boxes
     assert texts[-1].startswith("solving with the best sizes")
+
+
+def test_a_box_that_cannot_be_solved_is_told():
+    """It is tried from all starts too; what lies in it is not said to be no better."""
+    scene = registry.load("beatup").update({"bounds.l1": "30 mm", "bounds.l4": "167 mm"})
+    nominal = engine.solve(scene, "pulse")
+    task = Task(scene, "pulse", Settings())
+    lattice = size_rounding.Lattice(task, read_sizes(scene, {"l2": "2 mm", "l3": "2 mm"}))
+    tried = []
+
+    def solve(task):
+        tried.append(task)
+        answer = engine.solve(task.scene, "pulse", near=task.near)
+        return answer if len(tried) == 1 else replace(answer, status="failed")
+
+    best = size_rounding._branch(lattice, nominal, solve)
+    assert (best.point, best.unsolved, best.boxes) == (None, 2, 3)
+    assert [len(task.near) for task in tried[1:]] == [1, 0, 1, 0]
+    assert size_rounding._without_sizes(lattice, nominal, best).status == "failed"
+    found = best._replace(point={"l2": 0.08, "l3": 0.16})
+    message = size_rounding._explain(lattice, nominal, nominal, found).message
+    assert "2 of 3 boxes of sizes could not be solved" in message
+    assert "is better" not in message
 
 
 def test_a_step_of_the_call_that_meets_a_stock_of_the_file_is_told_by_the_files_key():

@@ -7,6 +7,7 @@ The price is a difference of re-solved figures, which is independent of the mult
 import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import loomopt as lo
@@ -100,6 +101,82 @@ def test_prices_of_a_root_are_those_of_the_figure():
 @pytest.mark.parametrize("problem", sorted(problems()))
 def test_every_packaged_scene(problem):
     check_ranges(registry.load(problem))
+
+
+@pytest.fixture(scope="module")
+def press():
+    scene = registry.load("knuckle-press")
+    return study.plan_sensitivity(scene, engine.solve(scene))
+
+
+@pytest.mark.slow
+def test_a_number_of_numpy_is_read_as_any_other(press):
+    """Its text has its type in NumPy 2, which no unit follows."""
+    for key in press.numbers:
+        changed, program = press.change(key, press.value(key))
+        same, other = press.change(key, np.float64(press.value(key)))
+        assert (changed.document, program.parameters) == (same.document, other.parameters)
+
+
+@pytest.mark.slow
+def test_newton_on_a_path_does_not_depend_on_the_basis_of_the_hessian(press):
+    """A null space has many bases, and each decomposition may give another."""
+    optimum = press.optimum
+    working_set = next(iter(optimum.working_sets()))
+    _, program = press.change("bounds.rod.max", press.value("bounds.rod.max") * 1.002)
+    fresh = study._newton(optimum, working_set, program, study.PathPlace(optimum.x))
+    basis, product = fresh.bends
+    turned, _ = np.linalg.qr(np.random.default_rng(0).standard_normal((basis.shape[1],) * 2))
+    start = study.PathPlace(optimum.x, bends=(basis @ turned, product @ turned))
+    for name, value in study._newton(optimum, working_set, program, start).x.items():
+        assert value == pytest.approx(fresh.x[name], rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_path_takes_few_optima_and_fewer_hessians(press, monkeypatch):
+    """Places of a path are predicted from their neighbours, whose Hessian serves them too."""
+    points, hessians = [], []
+    excess, product = study.Path.excess, type(press.optimum).hessian_product
+    monkeypatch.setattr(study.Path, "excess", lambda *of: points.append(of) or excess(*of))
+    monkeypatch.setattr(type(press.optimum), "hessian_product", lambda *of: hessians.append(of) or product(*of))
+    working_sets = list(press.optimum.working_sets())
+    (price,) = (price for price in press.answer.binding if price.limit == "upper")
+    (found,) = study._price_ranges(press, working_sets, {}, price)
+    assert all(why.startswith("the price moves") for why in found.ends)
+    assert len(points) <= 2 * 20
+    assert len(hessians) <= len(points) / 3
+
+
+class Line:
+    """Path of known excesses; shifts: those read."""
+
+    def __init__(self, rows, change):
+        self.rows, self.change, self.shifts = rows, change, []
+
+    def excess(self, shift):
+        self.shifts.append(shift)
+        return study.Excess(shift, self.rows(shift), self.change(shift), "")
+
+
+@pytest.mark.parametrize(
+    ("rows", "change", "end", "most"),
+    [
+        (lambda t: -1e-3, lambda t: t - 0.1, 0.1, 6),
+        (lambda t: -1e-3 - t, lambda t: 3 * t * (1 + t) - 0.1, 0.032284, 12),
+        (lambda t: 1e3 * (t - 0.07), lambda t: t - 0.1, 0.07, 6),
+        (lambda t: -1e-9, lambda t: math.expm1(2 * t) - 0.1, 0.047655, 12),
+        (lambda t: -1.0 if t < 1 / 3 else math.inf, lambda t: t - 1, 1 / 3, 45),
+    ],
+    ids=["line", "parabola", "rows", "exponential", "no design"],
+)
+def test_the_end_of_a_range_is_found_in_few_points(rows, change, end, most):
+    """Excesses of rows far below 0 do not slow the line through those of the price down."""
+    line = Line(rows, change)
+    inside, outside = study._bracket_end(line, line.excess(1e-7), line.excess(0.5), 1.0)
+    assert inside.worst <= 0.0 < outside.worst
+    assert outside.shift - inside.shift <= 1e-9 * outside.shift
+    assert inside.shift == pytest.approx(end, rel=1e-3)
+    assert len(line.shifts) - 2 <= most
 
 
 @pytest.mark.slow
