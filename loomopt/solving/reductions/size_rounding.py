@@ -413,9 +413,7 @@ def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
         UnitFormatter(lattice.scene),
         list(dict.fromkeys(level.figure for level in lattice.program.objectives)),
     )
-    figures = ", ".join(
-        f"{name} {formatter.shown(name, (best or bound).figures[name] or 0.0, 6)}" for name in names
-    )
+    figures = ", ".join(f"{name} {formatter.shown(name, (best or bound).figures[name] or 0.0, 6)}" for name in names)
     if best is None:
         return f"none found yet, at best {figures}"
     gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
@@ -464,7 +462,9 @@ def _explain(lattice: Lattice, answer: Solution, nominal: Solution, best: Best) 
         texts.append(f"At most {100 * best.gap:.2g} % better may exist on the lattice of {lattice.points} points")
         texts[-1] += f": {best.boxes} boxes were solved."
     elif best.unsolved:
-        text = f"Better sizes may exist among the {lattice.points} points of the lattice: {best.unsolved} of {best.boxes}"
+        text = (
+            f"Better sizes may exist among the {lattice.points} points of the lattice: {best.unsolved} of {best.boxes}"
+        )
         texts.append(f"{text} boxes of sizes could not be solved.")
     else:
         counts = "" if best.admissible is None else f", {best.admissible} of which keep all limits"

@@ -729,9 +729,7 @@ class Path:
 
     def _predict(self, near: Sequence[float], shift: float) -> PathPlace:
         """Place at a shift by the polynomial through known ones, with the rows of the nearest."""
-        weights = [
-            math.prod((shift - other) / (known - other) for other in near if other != known) for known in near
-        ]
+        weights = [math.prod((shift - other) / (known - other) for other in near if other != known) for known in near]
         names = self.study.optimum.names
         start = self.places[near[0]]
         moved = {name: sum(w * self.places[k].x[name] for w, k in zip(weights, near, strict=True)) for name in names}
