@@ -186,15 +186,15 @@ def test_an_evaluation_goes_on_in_its_own_scene_and_target(evaluation):
 
 
 PUBLIC = [getattr(lo, name) for name in lo.__all__]
-CLASSES = [each for each in PUBLIC if inspect.isclass(each)]
+CLASSES = [entry for entry in PUBLIC if inspect.isclass(entry)]
 METHODS = [
     (kind, name, getattr(member, "fget", None) or getattr(member, "func", None) or getattr(member, "__func__", member))
     for kind in CLASSES
     for name, member in inspect.getmembers_static(kind)
     if not name.startswith("_") and "loomopt" in str(getattr(member, "__module__", None) or member)
 ]
-CALLS = [(lo, each.__name__, each) for each in PUBLIC if not inspect.isclass(each)] + [
-    each for each in METHODS if inspect.isfunction(each[2])
+CALLS = [(lo, entry.__name__, entry) for entry in PUBLIC if not inspect.isclass(entry)] + [
+    entry for entry in METHODS if inspect.isfunction(entry[2])
 ]
 
 

@@ -257,13 +257,13 @@ def table_of(raw):
 
 def test_a_parquet_file_has_the_gaps_of_csv(tmp_path):
     frame = pd.DataFrame({"phi [deg]": [0.0, 90.0, 180.0], "Md [N*m]": [1.0, None, 3.0]})
-    found = []
+    tables = []
     for ending, write in (("csv", frame.to_csv), ("parquet", frame.to_parquet)):
         write(tmp_path / f"p.{ending}", index=False)
         columns = csv_tables.read_measured(tmp_path / f"p.{ending}", {"phi": "angle", "Md": "torque"}).columns
-        found.append(str(dict(columns)))
-    assert found[0] == found[1]
-    assert "nan" in found[0]
+        tables.append(str(dict(columns)))
+    assert tables[0] == tables[1]
+    assert "nan" in tables[0]
 
 
 NUMBERS = (

@@ -167,6 +167,6 @@ def test_sweeps_and_families_take_either_name(name):
     plans = [sweep.plan_sweep(scene, {key: "700:740:20 N*m"}) for key in BOTH]
     assert plans[0].axes == plans[1].axes
     members = [[{key: "700 N*m"}, {key: "745 N*m"}] for key in (*BOTH, "M0")]
-    changes = [family.changes(scene.set("targets.family.members", each)) for each in members]
+    changes = [family.changes(scene.set("targets.family.members", group)) for group in members]
     assert changes[0] == changes[1] == changes[2]
     assert scene.given(BOTH[0]) == scene.given(BOTH[1]) == "745 N*m"

@@ -113,10 +113,10 @@ def test_the_straightest_line_with_a_stroke_is_that_of_slsqp():
         {"type": "ineq", "fun": lambda x: (stroke(x[:5] / 10) - 0.18) * 10},
     ]
     start = np.append(TODAY * 10, 1.0)
-    found = scipy.optimize.minimize(lambda x: x[5], start, constraints=rows, method="SLSQP",
+    optimum = scipy.optimize.minimize(lambda x: x[5], start, constraints=rows, method="SLSQP",
                                     options={"maxiter": 500, "ftol": 1e-13})  # fmt: skip
-    assert found.success
-    assert answer.figures["travel.line"] == pytest.approx(found.x[5] / 1e3, rel=1e-3)
+    assert optimum.success
+    assert answer.figures["travel.line"] == pytest.approx(optimum.x[5] / 1e3, rel=1e-3)
     assert answer.figures["swing"] == pytest.approx(0.18, abs=1e-9)
     # The linkage of Hoecken: rocker and rod alike, the point twice as far.
     assert answer.design["l3"] == pytest.approx(answer.design["l2"], rel=1e-6)
