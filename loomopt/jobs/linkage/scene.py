@@ -282,7 +282,7 @@ def _windows(cursor: Cursor, linked: Chain, numbers: Numbers, places: Sequence[E
         output, value = _coordinate(place, linked, read.words), read.numbers.get("value")
         if bool(level) == bool(value):
             problem = "a window needs level or value, not both: its travel is measured from there"
-            raise place.fault(problem, remedy='Such as level = "rear"')
+            raise place.at("level").fault(problem, remedy='Such as level = "rear"')
         if value and output is None:
             remedy = f"Name the coordinate that it is a value of: {', '.join(FORMS)}"
             raise place.at("value").fault("the window has no coordinate", remedy=remedy)
