@@ -106,7 +106,7 @@ def run_page(text: str) -> Iterator[tuple[str, list[str]]]:
             words = body.partition("\n")[0].removeprefix("$ loomopt ")
             yield words, output(words)
         elif kind == "sh":
-            for line in body.splitlines():
+            for line in body.replace("\\\n", " ").splitlines():
                 output(line.removeprefix("loomopt "))
         elif kind == "python":
             code = compile(body, "page", "exec")

@@ -5,6 +5,7 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -369,6 +370,43 @@ def _chart(panel: NumberColumn, places: Sequence[NumberColumn], findings: Findin
         panel.heading, across, series, (), gaps, at, dots, list(dict.fromkeys(key)),
         numbered=True, upright=_axis(y) if len(set(x[np.isfinite(x)])) == 1 else None,
     )  # fmt: skip
+
+
+def check_comparable(study: SceneStudy, others: Sequence[SceneStudy]) -> None:
+    """Raise BadInput for a study over other numbers, which cannot be in the same chart."""
+    for other in others:
+        if list(other.kinds.items()) != list(study.kinds.items()):
+            problem = f"the study of {other.scene.name} is over {' and '.join(other.kinds)}"
+            remedy = "Give studies over the same numbers"
+            raise refusal(problem, study.scene.origin, "others", allowed=" and ".join(study.kinds), remedy=remedy)
+
+
+def with_studies(charts: Charts, study: SceneStudy, others: Sequence[tuple[SceneStudy, Findings]]) -> Charts:
+    """Charts with the lines of other studies over the same number, each under the name of its scene."""
+    drawn = [chart for chart in charts.charts if isinstance(chart, Chart)]
+    if not others or not drawn:
+        return charts
+    units, lines = ColumnUnits(study, False), dict[str, list[Series]]()
+    width, key = factor(units.of(next(iter(study.kinds)))), [("c0", study.scene.name)]
+    for place, (other, findings) in enumerate(others, 1):
+        kind, made = f"c{place % COLOURS}", columns(other, findings.rows, si=True)
+        key.append((kind, other.scene.name))
+        over = np.array(made["place"][0].values, dtype=float) / width
+        order, certified = np.argsort(over, kind="stable"), [row.certified for row in findings.rows]
+        for column in (column for name, part in made.items() if name != "place" for column in part):
+            values = np.where(certified, np.array(column.values, dtype=float), math.nan) / factor(units.of(column.name))
+            at = over[order], values[order]
+            lines.setdefault(column.name, []).extend(
+                [Series(*at, kind, other.scene.name), Series(*at, kind, points=True)]
+            )
+    more = [lines.get(chart.title.rpartition(" [")[0], []) for chart in drawn]
+    curves = [curve.x for group in (*(chart.series for chart in drawn), *more) for curve in group]
+    across = fit_axis(curves, name=drawn[0].x.name)
+    new = [
+        replace(chart, x=across, series=[*chart.series, *group], key=[*key, *chart.key], upright=None)
+        for chart, group in zip(drawn, more, strict=True)
+    ]
+    return replace(charts, charts=new)
 
 
 def _axis(values: Floats, name: str = "") -> Axis:

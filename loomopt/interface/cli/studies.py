@@ -125,10 +125,16 @@ def pareto(
     target: Annotated[
         str | None, typer.Option(help="Keep the other demands of this target; `none` for no demands.")
     ] = None,
+    beside: Annotated[
+        list[Path] | None,
+        typer.Option("--beside", metavar="STORE", help="Show the front of this store too: figure and table."),
+    ] = None,
     changes: SceneOptions = NO_CHANGES,
     how: RunOptions = USUAL,
 ) -> None:
     """Compute the front of two objectives."""
+    from loomopt.interface import study_table
+    from loomopt.interface.files import store_file
     from loomopt.studies.front import front
 
     scene = changes.scene(problem)
@@ -139,7 +145,9 @@ def pareto(
     study = front.trade(
         scene, axes, whose, maximise=maximise or (), minimise=minimise or (), ranges=ranges, points=count
     )
-    raise typer.Exit(run(study, how))
+    others = [table for path in beside or () for table in store_file.read_studies(path)]
+    study_table.check_comparable(study, [table.study for table in others])
+    raise typer.Exit(run(study, how, others))
 
 
 def _axes(minimise: list[str], maximise: list[str], against: str) -> tuple[str, str]:
@@ -172,8 +180,11 @@ def _split_items(items: list[str], option: str, example: str, form: str) -> dict
     return parts
 
 
-def run(study: "SceneStudy", how: RunOptions) -> int:
-    """Run a study, print and write it; returns the exit status. After Ctrl-C the finished rows are printed."""
+def run(study: "SceneStudy", how: RunOptions, others: "Sequence[StudyTable]" = ()) -> int:
+    """Run a study, print and write it; returns the exit status. After Ctrl-C the finished rows are printed.
+
+    others: studies that its figure and tables show too.
+    """
     from concurrent.futures import BrokenExecutor
 
     from loomopt.interface.study.points import StudyTable, run_study
@@ -196,7 +207,7 @@ def run(study: "SceneStudy", how: RunOptions) -> int:
             finished = StudyTable(study, tuple(rows[point] for point in sorted(rows)))
             how.hand_over(finished, f", {counted(study, len(rows), 'of the')}, as far as they were finished")
         raise
-    how.hand_over(table)
+    how.hand_over(table.with_studies(*others))
     return status(table.rows)
 
 

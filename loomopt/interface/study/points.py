@@ -3,7 +3,7 @@
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,10 +31,28 @@ class StudyTable(Presentation):
     """A front or a sweep with its rows; SI inside, the units of its scene where a person reads it.
 
     solved: the rows of all points that were solved, in their order; of a front some are dominated by others.
+    others: studies of other scenes over the same number, which its figure and its tables show too.
     """
 
     study: SceneStudy
     solved: tuple[Row, ...]
+    others: tuple["StudyTable", ...] = ()
+
+    def with_studies(self, *others: "StudyTable") -> "StudyTable":
+        """Same study, with studies of other scenes in its figure and below its table.
+
+        others: fronts or sweeps over the same number. Raises BadInput for one over another number.
+
+        Examples
+        --------
+        >>> import loomopt as lo
+        >>> axes = ("peak_torque", "m4e")
+        >>> light, heavy = (lo.pareto(f"beatup-{name}", axes, points=3) for name in ("light", "heavy"))
+        >>> len(light.with_studies(heavy).tables()) > len(light.tables())
+        True
+        """
+        study_table.check_comparable(self.study, [other.study for other in others])
+        return replace(self, others=(*self.others, *others))
 
     @lazy
     def findings(self) -> Findings:
@@ -67,11 +85,13 @@ class StudyTable(Presentation):
 
     def tables(self, *, si: bool = False) -> list[str | TextTable]:
         """Tables of a study: a line per row, the changes along it, and the outcome."""
-        return study_table.tables(self.study, self.solved, si)
+        others = (table for other in self.others for table in other.tables(si=si))
+        return [*study_table.tables(self.study, self.solved, si), *others]
 
     def charts(self) -> Charts:
         """Charts of the quantities of the study over the first number that varies."""
-        return study_table.charts(self.study, self.findings)
+        others = [(other.study, other.findings) for other in self.others]
+        return study_table.with_studies(study_table.charts(self.study, self.findings), self.study, others)
 
     def answer(self, point: "int | str | Mapping[str, str | float]") -> Answer:
         """Whole answer of a row: its solve is repeated, to the same digits.
@@ -128,6 +148,7 @@ class StudyTable(Presentation):
             "gaps": list(self.findings.gaps),
             **({} if self.findings.bettered is None else {"bettered": self.findings.bettered}),
             "provenance": study_table.study_provenance(self.study),
+            **({"others": [other.as_dict() for other in self.others]} if self.others else {}),
         }
 
     def __len__(self) -> int:
