@@ -43,8 +43,8 @@ def test_the_recipe_of_the_page_gives_both_fronts(tmp_path, monkeypatch, capsys)
     Path("four-bar.toml").write_text(scene, encoding="utf-8")
     first, second = commands()
     assert run(first) == 0
-    ends = numbers("six-bar at 400 rpm")[0][1:2] * 2
-    assert run([*shortened(second, (ends[0] - 0.5, ends[0] + 0.5)), "--json"]) == 0
+    rest = numbers("six-bar at 400 rpm")[0][1]
+    assert run([*shortened(second, (rest - 0.05, rest + 0.05)), "--json"]) == 0
     printed = capsys.readouterr().out
     document = json.loads(printed[printed.index("\n{") + 1 :])
     for title, rows in (("six-bar at", document["rows"]), ("four-bar at", document["others"][0]["rows"])):
@@ -53,7 +53,11 @@ def test_the_recipe_of_the_page_gives_both_fronts(tmp_path, monkeypatch, capsys)
         inside = [k for k, rest in enumerate(rests) if front[0][0] - 0.01 <= rest <= front[-1][0] + 0.01]
         assert len(inside) == (1 if title == "six-bar at" else len(rests))
         for k in inside:
-            assert np.interp(rests[k], *zip(*front, strict=True)) == pytest.approx(torques[k], rel=1e-3)
+            torque = np.interp(rests[k], *zip(*front, strict=True))
+            # A part of the six-bar's front is searched less widely than all of it: no row is better than the page's.
+            assert torque >= torques[k] * (1 - 1e-3)
+            if title == "four-bar at":
+                assert torque == pytest.approx(torques[k], rel=1e-3)
         assert all(row["certified"] for row in rows)
     assert Path("drives.png").stat().st_size > 10_000
 
