@@ -96,7 +96,7 @@ MISTAKES = [
     ),
     (
         {"windows": {"rest": {"after": "front", "begins": "100 deg", "ends": "120 deg"}}},
-        "windows.rest",
+        "windows.rest.level",
         "a window needs level or value",
     ),
     (

@@ -124,7 +124,7 @@ def test_the_straightest_line_with_a_stroke_is_that_of_slsqp():
 
 
 WRONG = {
-    "one of them": {"y": "P"},
+    "a window needs level or value": {"y": "P"},
     "has one coordinate, not x and y": {"x": "P", "y": "P", "value": "h"},
     "the window has no coordinate": {"value": "160 mm"},
     'unknown joint "Q"': {"y": "Q", "value": "h"},
