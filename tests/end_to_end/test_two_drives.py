@@ -87,5 +87,5 @@ def test_a_figure_has_the_lines_of_both_studies_in_its_own_units(fronts):
 @pytest.mark.slow
 def test_studies_over_other_numbers_are_refused(fronts):
     other = lo.pareto("beatup-light", ("peak_torque", "mu_min"), points=3)
-    with pytest.raises(lo.BadInput, match="the study of beatup-light is over .*mu_min"):
+    with pytest.raises(lo.BadInput, match=r"the study of beatup-light is over .*mu_min"):
         fronts[0].with_studies(other)
