@@ -50,10 +50,11 @@ def test_the_recipe_of_the_page_gives_both_fronts(tmp_path, monkeypatch, capsys)
     for title, rows in (("six-bar at", document["rows"]), ("four-bar at", document["others"][0]["rows"])):
         rests, torques = numbers(title)
         front = sorted((np.degrees(row["figures"]["length.still"]), row["figures"]["peak_torque"]) for row in rows)
+        places, values = zip(*front, strict=True)
         inside = [k for k, rest in enumerate(rests) if front[0][0] - 0.01 <= rest <= front[-1][0] + 0.01]
         assert len(inside) == (1 if title == "six-bar at" else len(rests))
         for k in inside:
-            torque = np.interp(rests[k], *zip(*front, strict=True))
+            torque = np.interp(rests[k], places, values)
             # A part of the six-bar's front is searched less widely than all of it: no row is better than the page's.
             assert torque >= torques[k] * (1 - 1e-3)
             if title == "four-bar at":
