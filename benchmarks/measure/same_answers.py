@@ -150,18 +150,19 @@ def answered(request: Case) -> Case:
     except lo.BadInput as error:
         return {"status": "refused", "message": str(error)}
     objectives = program_of(scene, request["target"]).objectives
-    result = answer.as_dict()
+    result, reached = answer.as_dict(), {**answer.design, **answer.figures}
+    today = answer.today if hasattr(answer, "today") else answer.before
     return {
         "status": answer.status,
         "message": answer.message,
-        "objectives": [[item.figure, answer.figures[item.figure], item.scale, item.power] for item in objectives],
+        "objectives": [[item.figure, reached[item.figure], item.scale, item.power] for item in objectives],
         "binding": sorted(f"{price.limit} {price.side}" for price in answer.binding),
         "worth": {f"{p.limit} {p.side}": dict(p.worth) for p in answer.binding},
         "keys": sorted(keys(result)),
         "clash": sorted(answer.clash),
         "relaxation": {f"{item.limit} {item.side}": item.needed for item in answer.relaxation},
-        "figures": {**result["figures"], **{f"today's {k}": v for k, v in answer.before.figures.items()}}
-        if answer.before
+        "figures": {**result["figures"], **{f"today's {k}": v for k, v in today.figures.items()}}
+        if today
         else result["figures"],
     }
 
