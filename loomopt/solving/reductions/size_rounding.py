@@ -405,24 +405,23 @@ def _branch(lattice: Lattice, nominal: Solution, solve: Solve) -> Best:
 
 
 def _progress(lattice: Lattice, best: Solution | None, bound: Solution) -> str:
-    """Phrase of the objectives at the best sizes, and of the gap to the bound.
+    """Phrase of the objectives at the best sizes, and of the gap to the bound in the first of them that has one.
 
     bound: the answer of the most promising box that is open.
     """
-    formatter, names = (
-        UnitFormatter(lattice.scene),
-        list(dict.fromkeys(level.figure for level in lattice.program.objectives)),
-    )
-    figures = ", ".join(f"{name} {formatter.shown(name, (best or bound).figures[name] or 0.0, 6)}" for name in names)
+    formatter = UnitFormatter(lattice.scene)
+    sizes = {level.figure: level.scale ** (1 / level.power) for level in lattice.program.objectives}
+
+    def shown(name: str, value: float, digits: int) -> str:
+        return formatter.shown(name, value if abs(value) > AGREES * sizes[name] else 0.0, digits)
+
+    figures = ", ".join(f"{name} {shown(name, (best or bound).figures[name] or 0.0, 6)}" for name in sizes)
     if best is None:
         return f"none found yet, at best {figures}"
-    gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in names}
-    sizes = {level.figure: level.scale ** (1 / level.power) for level in lattice.program.objectives}
-    label = {name: f"{name} " if len(names) > 1 else "" for name in names}
-    gap_texts = [
-        f"{label[name]}{formatter.shown(name, gap, 2)}" for name, gap in gaps.items() if gap > AGREES * sizes[name]
-    ]
-    return f"best {figures}; gap {', '.join(gap_texts) or '0'}"
+    gaps = {name: abs((best.figures[name] or 0.0) - (bound.figures[name] or 0.0)) for name in sizes}
+    name = next((name for name, gap in gaps.items() if gap > AGREES * sizes[name]), "")
+    label = f"{name} " if len(sizes) > 1 and name else ""
+    return f"best {figures}; gap {label}{shown(name, gaps[name], 2) if name else 0}"
 
 
 def _distance(lattice: Lattice, name: str, value: float) -> float | None:

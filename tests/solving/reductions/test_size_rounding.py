@@ -160,6 +160,21 @@ def test_progress_says_boxes_best_and_gap_through_every_solve():
     assert texts[-1].startswith("solving with the best sizes")
 
 
+def test_the_gap_is_that_of_the_first_level_that_has_one_and_rounding_is_0():
+    scene = registry.load("beatup")
+    lattice = size_rounding.Lattice(Task(scene, "balance", Settings()), read_sizes(scene, {"l2": "2 mm"}))
+    bound = engine.solve(scene, "balance", starts=1)
+    first = replace(bound, figures={**bound.figures, "M3_fdc": 0.25, "peak_torque": 91.0})
+    second = replace(bound, figures={**bound.figures, "M3_fdc": 1e-13, "peak_torque": 91.0})
+    bound = replace(bound, figures={**bound.figures, "M3_fdc": -1e-12, "peak_torque": 90.0})
+    assert size_rounding._progress(lattice, None, bound) == "none found yet, at best M3_fdc 0 N*m, peak_torque 90 N*m"
+    best = "best M3_fdc 0.25 N*m, peak_torque 91 N*m"
+    assert size_rounding._progress(lattice, first, bound) == f"{best}; gap M3_fdc 0.25 N*m"
+    best = "best M3_fdc 0 N*m, peak_torque 91 N*m"
+    assert size_rounding._progress(lattice, second, bound) == f"{best}; gap peak_torque 1 N*m"
+    assert size_rounding._progress(lattice, bound, bound).endswith("; gap 0")
+
+
 def test_a_box_that_cannot_be_solved_is_told():
     """It is tried from all starts too; what lies in it is not said to be no better."""
     scene = registry.load("beatup").update({"bounds.l1": "30 mm", "bounds.l4": "167 mm"})
