@@ -24,8 +24,17 @@ from loomopt.physics.tolerances import RANK
 from loomopt.solving.certificate.derivatives import JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow
 from loomopt.solving.certificate.records import Level
-from loomopt.solving.nlp.point import sampler_at
-from loomopt.solving.search.search import Search, at_step, certify_best, objectives, printed_design, solve_from
+from loomopt.solving.nlp.point import Point, sampler_at
+from loomopt.solving.search.search import (
+    Candidate,
+    Search,
+    at_step,
+    certify_best,
+    certify_uncorrected,
+    objectives,
+    printed_design,
+    solve_from,
+)
 
 NEAR_ZERO, ANGLES = 1e-3, 12
 """Share of its scale below which a level is tried at 0, and the number of crank angles from which those of the
@@ -60,11 +69,12 @@ def _value(spot: Spot, instant: Instant) -> Number:
 def fix_first_level(search: Search) -> Search:
     """The search with its first level fixed at 0 and the later ones optimised, if that passes.
 
-    Unchanged where the first level cannot vanish, is not near 0, or already vanishes in a certified best.
+    Unchanged where the first level cannot vanish, is not near 0, or already vanishes in a certified best. A single
+    level is moved to 0 where that is certified.
     """
     program, best = search.program, search.best
     first, *later = program.objectives
-    sampler = sampler_at(program, best.x) if best and later else None
+    sampler = sampler_at(program, best.x) if best else None
     names = smooth_quantities(program.model, first)
     if best is None or sampler is None or not names:
         return search
@@ -72,6 +82,8 @@ def fix_first_level(search: Search) -> Search:
     if share > NEAR_ZERO or (search.passed and first.vanishes(sampler)):
         return search
     empty_search = replace(search, candidates=(), best=None)
+    if not later:
+        return _with_zero(search, best.x, sampler, names)
     first_search = solve_from(
         at_step(replace(empty_search, program=replace(program, objectives=(first,))), "holding 0"), best.x
     )
@@ -79,7 +91,8 @@ def fix_first_level(search: Search) -> Search:
     sampler = sampler_at(program, x)
     if sampler is None or not first.vanishes(sampler):
         return search
-    later_search = solve_from(replace(empty_search, program=_later_levels(program, x, sampler, names)), x)
+    later_program = replace(_with_rows_at_zero(program, x, sampler, names), objectives=tuple(later))
+    later_search = solve_from(replace(empty_search, program=later_program), x)
     later_search = fix_first_level(certify_best(later_search))
     later_best = later_search.best
     if later_best is None or not later_search.passed:
@@ -96,6 +109,23 @@ def fix_first_level(search: Search) -> Search:
     )
 
 
+def _with_zero(search: Search, x: Mapping[str, float], sampler: Sampler, names: tuple[str, ...]) -> Search:
+    """The search of a single level with a design at which it vanishes, if there is one near x.
+
+    The slope of the square falls with the quantity, so that a solve may end where 0 is near and not reached.
+    """
+    objective = search.program.objectives[0]
+    program = _with_rows_at_zero(search.program, x, sampler, names)
+    zero = solve_from(replace(search, program=program, candidates=(), best=None), x).candidates[-1].point
+    # Multipliers and rows belong to the program with equalities: of the point only the design is taken.
+    design = Point(dict(zero.x), zero.status, zero.usable)
+    candidate = certify_uncorrected(search, Candidate(design, objectives(search.program, design.x)))
+    at_zero = sampler_at(search.program, candidate.x)
+    if at_zero is None or not candidate.certificate.passed or not objective.vanishes(at_zero):
+        return search
+    return replace(search, best=candidate)
+
+
 def smooth_quantities(model: JobModel, level: Objective) -> tuple[str, ...]:
     """Smooth quantities that all vanish where a peak does; empty for a level that is no such peak."""
     if not isinstance(level, Peak) or level.least_of(model.signed) < 0.0:
@@ -106,8 +136,8 @@ def smooth_quantities(model: JobModel, level: Objective) -> tuple[str, ...]:
     return parts if all(map(model.has_quantity, parts)) else ()
 
 
-def _later_levels(program: Program, x: Mapping[str, float], sampler: Sampler, names: tuple[str, ...]) -> Program:
-    """A program of the later levels, with the first level's quantities 0 at crank angles as equalities."""
+def _with_rows_at_zero(program: Program, x: Mapping[str, float], sampler: Sampler, names: tuple[str, ...]) -> Program:
+    """A program with the first level's quantities 0 at crank angles, as equalities."""
     first = program.objectives[0]
     size = first.scale ** (1 / first.power)
     phi = TURN * (np.arange(ANGLES) + 0.5) / ANGLES
@@ -122,7 +152,7 @@ def _later_levels(program: Program, x: Mapping[str, float], sampler: Sampler, na
     selected = [spots[k] for k in independent_rows(slopes)]
     model = replace(program.model, own_rows={**program.model.own_rows, **{spot.name: spot.row() for spot in selected}})
     limits = [DesignLimit(FIXED_AT_ZERO, 0, spot.name, 0.0, size, relaxable=False, hidden=True) for spot in selected]
-    return replace(program, model=model, limits=(*program.limits, *limits), objectives=program.objectives[1:])
+    return replace(program, model=model, limits=(*program.limits, *limits))
 
 
 def independent_rows(slopes: Floats) -> list[int]:

@@ -156,6 +156,32 @@ def test_a_four_bar_is_balanced_by_the_places_of_two_masses():
     assert answer.design["rocker.along"] == pytest.approx(-0.080, abs=1e-10)
 
 
+@pytest.mark.few(1)
+@pytest.mark.parametrize(
+    ("lengths", "masses", "along"),
+    [
+        ((59.1, 129.71, 145.45, 133.49), (0.69, 0.39, 0.76), 28.0),
+        ((54.2, 136.03, 120.59, 154.27), (0.44, 1.77, 1.64), 63.7),
+        ((54.24, 142.34, 194.68, 175.83), (1.59, 0.37, 1.75), 62.6),
+    ],
+)
+def test_a_balance_where_both_masses_stand_at_their_bounds_is_0_to_all_digits(lengths, masses, along):
+    a1, a2, a3, _ = lengths
+    crank, rod, rocker = masses
+    share = along / a2
+    ends = {"crank": -rod * (1 - share) * a1 / crank, "rocker": -rod * share * a3 / rocker}  # Berkof and Lowen
+    changes = {f"mechanism.a{k + 1}": f"{length} mm" for k, length in enumerate(lengths)}
+    changes |= {
+        f"effects.mass.{name}.mass": f"{mass} kg" for name, mass in zip(("crank", "rod", "rocker"), masses, strict=True)
+    }
+    changes |= {"operation.speed": "900 rpm", "effects.mass.rod.along": f"{along} mm"}
+    changes |= {f"effects.mass.{name}.along": f"{begin} mm" for name, begin in (("crank", 20), ("rocker", -10))}
+    changes |= {f"bounds.mass.{name}.along": {"min": f"{end!r} mm", "max": "40 mm"} for name, end in ends.items()}
+    balanced = scene(FOUR_BAR, ["shaking_force"], changes)
+    today = lo.evaluate(balanced).figures["shaking_force"]
+    vanished(lo.solve(balanced), "shaking_force", today)
+
+
 @pytest.mark.few(2)
 @pytest.mark.parametrize(
     ("name", "size", "on"),
