@@ -28,9 +28,10 @@ from loomopt.model.limits import CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import bounds, curves, numbers, words
 from loomopt.model.objectives import Magnitude, Objective, Peak, Value, opposite
-from loomopt.model.program import Move, Numbers
+from loomopt.model.program import Goal, Move, Numbers
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Node
+from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes.scene import Scene
 
 TURNING_SHARE = 0.01
@@ -190,6 +191,13 @@ class LinkageTask(Task):
             ),
             *self._turning_margins(),
         ]
+
+    def goals(self) -> tuple[Goal, ...]:
+        """Load at an event that the target minimises first: zero is reached, or is out of reach."""
+        name, sense = self.levels[0] if self.levels else ("", "")
+        if sense != "least" or name in self.traded or name not in self._loads:
+            return ()
+        return (Goal(name, 0.0, 0.0, FEASIBLE * self.figure_size(name)),)
 
     def _turning_margins(self) -> list[Limit]:
         """Rows by which the output still turns back at an extreme whose load, crank angle or window is optimised.

@@ -58,6 +58,25 @@ def test_the_optimum_is_that_of_the_beat_up(M0):
 
 
 @pytest.mark.few(1)
+@pytest.mark.parametrize(("M0", "is_reached"), [(745, True), (600, False)])
+def test_a_balance_is_a_goal_that_is_reached_or_not(M0, is_reached):
+    beatup, chain = solved(M0)
+    assert beatup.reached == {"M3_fdc": is_reached}
+    assert chain.reached == {"moment.front": is_reached}
+
+
+@pytest.mark.slow
+def test_a_family_tells_which_members_reach_their_balance():
+    """One linkage with a counterweight of its own for each cloth, as the family of the beat-up."""
+    members = [{"M0": f"{torque} N*m"} for torque in (600, 745)]
+    tables = {"targets.family.members": members, "targets.family.of": "balance"}
+    beatup = lo.solve(BEATUP.update({**tables, "targets.family.own": ["m4e"]}), "family", starts=1)
+    chain = lo.solve(four_bar().update({**tables, "targets.family.own": ["mass"]}), "family", starts=1)
+    assert chain.reached == {name.replace("M3_fdc", "moment.front"): of for name, of in beatup.reached.items()}
+    assert list(chain.reached) == ["moment.front"]
+
+
+@pytest.mark.few(1)
 @pytest.mark.parametrize("M0", TORQUES)
 def test_prices_are_those_of_the_beat_up(M0):
     beatup, chain = solved(M0)
