@@ -203,6 +203,9 @@ PIVOT_EXCESS = 1e-2
 """Largest excess from which pivots are tried before a second solve. They take 104 of 119 starts below it to the known
 design and 7 of 78 above it (all packaged targets, and fronts of three), in 4 ms where that solve takes 11."""
 
+NEAR_KNOWN = 0.1
+"""Scaled difference of each variable up to which the end of a first round counts as in the basin of the best known."""
+
 SAME_SLOPE = 1e-8
 """Change of a slope after new events that is negligible: a hundredth of STATIONARY."""
 
@@ -429,12 +432,18 @@ def _add_known_nodes(calls: Calls, first_place: _Place, result: _Round | Point) 
     They show soon whether a basin is as good; in the first round they would pull every start into the known basin.
     Nodes that are dropped once cannot cycle; keeping all of them would need a larger NLP.
     """
-    if isinstance(result, Point) or not calls.known.nodes:
+    if isinstance(result, Point) or not calls.known.nodes or not _is_near_known(calls, result.end.x):
         return result
     place, active_nodes = result.end, _binding(result.end)
     added = (family_nodes[len(first) :] for family_nodes, first in zip(place.nodes, first_place.nodes, strict=True))
     nodes = [(*active, *new_nodes) for active, new_nodes in zip(active_nodes, added, strict=True)]
     return result._replace(end=place._replace(nodes=calls.with_known(nodes), multipliers=Multipliers()))
+
+
+def _is_near_known(calls: Calls, x: Mapping[str, float]) -> bool:
+    """Whether variables x (SI) lie near those of the best known design; without these they do."""
+    known = calls.known.x
+    return all(abs(x[v.name] - known.get(v.name, x[v.name])) <= NEAR_KNOWN * v.scale for v in calls.program.variables)
 
 
 def _end_point(calls: Calls, result: _Round) -> Point:

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from loomopt.base.records import Frozen
 from loomopt.model.program import Program
 from loomopt.model.sampling import Extreme, Sampler, sampled, search_together
 from loomopt.physics.cycle import Floats
@@ -133,15 +134,17 @@ class Elastic(NamedTuple):
 class Known(NamedTuple):
     """Results of earlier solves of a program.
 
-    nodes: of each family, where its rows bind; a solve adds them to its nodes from its second round on. cutoff: the
-    NLP's objective (elastic: the sum of the excesses of cost 1) that a solve must stay below: a round's value is a
-    lower bound of its basin, and the solve stops once the bound exceeds `most`. levels: objectives of the best, in
-    their scales; a solve that lowers an earlier level continues, although its NLP objective may be larger.
+    nodes: of each family, where its rows bind; a solve adds them to its nodes from its second round on, with x only if
+    its first round ends near these variables, SI. cutoff: the NLP's objective (elastic: the sum of the excesses of
+    cost 1) that a solve must stay below: a round's value is a lower bound of its basin, and the solve stops once the
+    bound exceeds `most`. levels: objectives of the best, in their scales; a solve that lowers an earlier level
+    continues, although its NLP objective may be larger.
     """
 
     nodes: tuple[tuple[Extreme, ...], ...] = ()
     cutoff: float = math.inf
     levels: tuple[float, ...] = ()
+    x: Mapping[str, float] = Frozen()
 
 
 def sampler_at(program: Program, x: Mapping[str, float], samples: int = SAMPLES) -> Sampler | None:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from loomopt.base.records import Frozen
 from loomopt.maths import systems
 from loomopt.maths.jets import Jet, variables
 from loomopt.maths.sobol import points
@@ -25,9 +26,10 @@ from loomopt.solving.nlp.rows import chain_roots
 from loomopt.solving.search import fallback, vanishing_levels
 from loomopt.solving.search.search import Candidate, OnStart, Search, at_step, certify_best, solve_from
 
-SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS = 48, 512, 8, 3, 2
+SCREENED_NODES, DESIGNS, MOVED_SHARE, PROJECTIONS, SCREENED_STARTS, CORNER_STARTS = 48, 512, 8, 3, 1, 1
 """Screening: nodes of a turn, designs, the reciprocal share of designs that are moved onto their limits, steps of that
-projection, and starts taken from the moved and from the random designs (benchmarks/adversarial/attack.py)."""
+projection, and starts taken from the moved and from the unmoved designs, of random ones and of corners of the box
+(benchmarks/adversarial/attack.py)."""
 
 
 AT_ENDS = 16
@@ -166,12 +168,23 @@ class Screening:
         self.count = min(DESIGNS, max(MOST_NODES // len(self.batch.u), FEWEST))
 
     def starts(self, seed: int) -> list[Start]:
-        """Starts far apart: the best of those moved onto their limits, then the best random ones."""
-        random_designs = self.designs(points(self.count, len(self.free), seed))
-        merits = self.merits(random_designs)
-        best = np.argsort(merits, kind="stable")[: self.count // MOVED_SHARE]
-        moved = self.project(random_designs[best])
-        chosen = (*self.diverse(moved, self.merits(moved)), *self.diverse(random_designs, merits))
+        """Starts far apart: the best of random designs moved onto their limits, then the best random ones."""
+        return self._best(points(self.count, len(self.free), seed), SCREENED_STARTS)
+
+    def corner_starts(self, seed: int) -> list[Start]:
+        """The best corner of the box moved onto its limits, then the best corner.
+
+        Many bounds are active at most optima: a basin may reach its corner and still be too narrow for random designs.
+        """
+        shares = points(self.count, len(self.free), seed)
+        return self._best(np.unique(np.where(shares < 0.5, FAR_END, 1 - FAR_END), axis=0), CORNER_STARTS)
+
+    def _best(self, shares: Floats, count: int) -> list[Start]:
+        """Starts far apart, from designs at shares of the ranges: `count` moved onto their limits, `count` unmoved."""
+        designs = self.designs(shares)
+        merits = self.merits(designs)
+        moved = self.project(designs[np.argsort(merits, kind="stable")[: max(len(designs) // MOVED_SHARE, count)]])
+        chosen = (*self.diverse(moved, self.merits(moved), count), *self.diverse(designs, merits, count))
         return [self.start(design) for design in chosen]
 
     def flipped(self, x: Mapping[str, float]) -> list[Start]:
@@ -242,13 +255,13 @@ class Screening:
             designs = self.batch.tops(np.clip(designs, self.least, self.most))
         return designs
 
-    def diverse(self, designs: Floats, merits: Floats) -> Floats:
-        """The best design, then repeatedly the next best that is far from those; nearer ones until enough."""
+    def diverse(self, designs: Floats, merits: Floats, count: int) -> Floats:
+        """The best design, then repeatedly the next best that is far from those, `count`; nearer ones until enough."""
         order = np.argsort(merits, kind="stable")
         shares = ((designs[:, self.free] - self.low[self.free]) / (self.high - self.low)[self.free])[order]
         chosen, apart = list[int](), APART
         nearest = np.full(len(designs), np.inf)
-        while len(chosen) < min(SCREENED_STARTS, len(designs)):
+        while len(chosen) < min(count, len(designs)):
             far = np.flatnonzero(nearest > apart)
             if not far.size:
                 apart = apart * CLOSER_TOGETHER if apart > APART / 1000 else -1.0
@@ -400,17 +413,20 @@ def search_basins(search: Search, seed: int, on_start: OnStart | None) -> Search
     began = time.perf_counter()
     screening = None if search.program.uniqueness_reason else _screening(search, job_starts)
     screened = _complete_starts(search, screening.starts(seed)) if screening else []
+    corners = _complete_starts(search, screening.corner_starts(seed)) if screening else []
     design_count, spent = screening.count if screening else 0, time.perf_counter() - began
     search = replace(search, screened=design_count, solve_seconds=search.solve_seconds + spent)
-    steps = _Steps(on_start, len(job_starts) + len(screened))
+    steps = _Steps(on_start, len(job_starts) + len(screened) + len(corners))
     for start in job_starts:
         search = steps.explore(search, start)
         if not search.usable and search.nearest is None:
-            search = find_least_relaxation(search, [*job_starts, *screened])
+            search = find_least_relaxation(search, [*job_starts, *screened, *corners])
             if search.clashes:
                 return search
     for start in screened:
         search = steps.explore(search, start)
+    for start in corners:
+        search = steps.explore(search, start, is_corner=True)
     for _ in range(FLIPS):
         if screening is None or not search.usable or is_unbeatable(search):
             break
@@ -432,10 +448,11 @@ class _Steps:
     count: int
     done: int = 0
 
-    def explore(self, search: Search, start: Mapping[str, float]) -> Search:
+    def explore(self, search: Search, start: Mapping[str, float], is_corner: bool = False) -> Search:
         """The search after a solve that stops as soon as it cannot be better than the best so far.
 
-        Nothing is solved if no design can be better.
+        Nothing is solved if no design can be better. is_corner: whether the nodes that bind at the best are added only
+        near it; they shorten a solve, but may draw it out of a narrow basin into that of the best.
         """
         self.done += 1
         if is_unbeatable(search):
@@ -448,7 +465,8 @@ class _Steps:
         if not search.usable:
             return solve_from(search, start)
         best = search.ranked[0]
-        return solve_from(search, start, known=Known(best.point.binding, best.value - BETTER, best.objectives))
+        known = Known(best.point.binding, best.value - BETTER, best.objectives, best.point.x if is_corner else Frozen())
+        return solve_from(search, start, known=known)
 
 
 def may_be_tied(search: Search) -> bool:

@@ -41,3 +41,23 @@ def test_another_seed_gives_the_same_optimum(answer):
         warnings.simplefilter("ignore")
         again = lo.solve(lo.load("rapier"), starts=8, seed=7)
     assert again.figures["peak_acceleration"] == pytest.approx(answer.figures["peak_acceleration"], rel=1e-8)
+
+
+def test_a_narrow_basin_in_a_corner_of_the_box_is_found():
+    """The dwell of the wide basin is 0.2196 rad; evolution from outside found the other one."""
+    bounds = {
+        "l4": ("8.1 mm", "41.0 mm"),
+        "l5": ("402.9 mm", "740.4 mm"),
+        "l6": ("176.1 mm", "199.2 mm"),
+        "l3p": ("133.2 mm", "159.9 mm"),
+        "alpha": ("41.23 deg", "59.14 deg"),
+        "C0x": ("416.9 mm", "458.7 mm"),
+        "C0y": ("244.0 mm", "253.9 mm"),
+        "phi40": ("186.45 deg", "190.43 deg"),
+    }
+    changes: dict[str, object] = {f"bounds.{name}": {"min": low, "max": high} for name, (low, high) in bounds.items()}
+    changes |= {"operation.stroke": "0.7735947078782108 m", "operation.s_dwell": "3.9 mm"}
+    changes |= {"operation.dwell_after": "36.8 deg", "operation.dwell_before": "14.81 deg"}
+    answer = lo.solve(lo.load("rapier").update({**changes, "limits.mu_min": {"min": "30.0 deg"}}), "dwell")
+    assert answer.status == "optimal"
+    assert answer.figures["dwell"] == pytest.approx(0.5225931861, rel=1e-6)
