@@ -243,11 +243,13 @@ class Sampler:
 
         The numbers behind these extremes are equal here, to the last bit and the sign of a zero.
         """
-        others = (
-            sampler for sampler in self.session.latest(SAMPLERS) if isinstance(sampler, Sampler) and sampler is not self
-        )
-        for other in others:
-            if other._extremes and self._holds(other):
+        mine = self.given.values
+        for other in self.session.latest(SAMPLERS):
+            if not isinstance(other, Sampler) or other is self or not other._extremes:
+                continue
+            # Derived numbers differ where any number does: one of them tells most designs apart.
+            name, value = other.last_number
+            if mine.get(name) == value and self._holds(other):
                 self._extremes = {**other._extremes, **self._extremes}
                 return
 
@@ -256,13 +258,12 @@ class Sampler:
         if other.model is not self.model or other.samples != self.samples:
             return False
         mine, others = self.given.values, other.given.values
-        # Derived numbers come last, and differ where any number does.
-        return all(_is_same(mine.get(name), others[name]) for name in other.names_from_last)
+        return all(_is_same(mine.get(name), value) for name, value in others.items())
 
     @lazy
-    def names_from_last(self) -> tuple[str, ...]:
-        """Names of the design's numbers, the derived ones first."""
-        return tuple(reversed([*self.given.values]))
+    def last_number(self) -> tuple[str, Number]:
+        """Name and value of the design's last number, a derived one if there is any."""
+        return next(reversed([*self.given.values.items()]), ("", None))
 
     def learn(self, extremes: Mapping[str, list[Extreme] | None]) -> None:
         """Record the extremes of quantities; None for one that is not a number somewhere on the grid."""

@@ -1,6 +1,6 @@
 """Answer of a target that starts from answers of neighbouring scenes: task, answer, optimum for the next neighbour."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from loomopt.jobs import registry
@@ -46,6 +46,15 @@ def figure_peaks(scene: Scene, job: Job, program: Program) -> tuple[str, ...]:
     numbers = {*program.parameters, *(v.name for v in program.variables)}
     checked = {name for check in model.checks if not numbers.issuperset(check.reads) for name in check.over_cycle}
     return tuple(name for name in job.peaks(model).values() if model.has_quantity(name) and name not in checked)
+
+
+def search_evaluated(searches: Iterable[tuple[Scene, Search]]) -> None:
+    """Compute what the figures of searches that ended beside their neighbours read over the cycle, in one pass."""
+    report.search_evaluated(
+        (scene, search.job, search.program, search.job.design(search.program, search.best.x))
+        for scene, search in searches
+        if search.best
+    )
 
 
 @working()

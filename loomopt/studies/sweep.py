@@ -305,7 +305,8 @@ class Sweep:
     def solved_together(self, tasks: Sequence[StudyTask]) -> list[Row | None]:
         """Rows of tasks between two neighbours' optima, independent of the batch; None for the others."""
         start = time.perf_counter()
-        pairs = zip(tasks, self._search_from_neighbours(tasks), strict=True)
+        pairs = list(zip(tasks, self._search_from_neighbours(tasks), strict=True))
+        neighbour_answer.search_evaluated((self.scene_at(task.point), search) for task, search in pairs if search)
         rows = [self._row_of_search(task, search) if search else None for task, search in pairs]
         mean = (time.perf_counter() - start) / max(1, sum(map(bool, rows)))
         return [replace(row, seconds=mean) if row else None for row in rows]

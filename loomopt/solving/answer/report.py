@@ -1,11 +1,13 @@
 """From a search to the answer that people and scripts read: the design, the limits that stop it, and clashes."""
 
+import contextlib
 import functools
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from loomopt.base.errors import BadInput
 from loomopt.base.units import factor
 from loomopt.jobs import registry
 from loomopt.jobs.base import Job
@@ -34,7 +36,7 @@ from loomopt.solving.answer.solution import (
     risen,
 )
 from loomopt.solving.certificate.records import Certificate, GlobalBound
-from loomopt.solving.nlp.point import BEATEN, excess, sampler_at
+from loomopt.solving.nlp.point import BEATEN, excess, sampler_at, search_extremes
 from loomopt.solving.options import target_name
 from loomopt.solving.search.search import Candidate, Search, compare
 
@@ -72,12 +74,11 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
 
         return family.evaluation(scene, job, program, design, evaluation)
     sampler = job.sampler(scene, design)
-    # The certificate has just computed most of the extremes.
-    sampler.share()
-    quantities = [limit.row for limit in program.cycle_limits.values() if not limit.hidden]
-    quantities += [name for objective in program.objectives for name in objective.quantities]
-    quantities += job.peaks(sampler.model).values() if every else []
-    sampler.search(name for name in quantities if sampler.model.has_quantity(name))
+    quantities = _evaluated_quantities(job, program, sampler, every)
+    if not all(map(sampler.knows, quantities)):
+        # The certificate has just computed most of the extremes.
+        sampler.share()
+        sampler.search(quantities)
     figures = job.figures(scene, design)
     formatter = UnitFormatter(scene)
     labels = numbers.labels(scene)
@@ -94,6 +95,31 @@ def evaluation(scene: Scene, job: Job, program: Program, design: Mapping[str, fl
         scene=scene,
         undefined=sampler.model.undefined,
     )
+
+
+@working()
+def search_evaluated(evaluations: Iterable[tuple[Scene, Job, Program, Mapping[str, float]]]) -> None:
+    """Compute what `evaluation` reads of designs (full names, SI) over the cycle, in one pass.
+
+    A design that fails here fails again where it is evaluated.
+    """
+    samplers: list[tuple[Sampler, tuple[str, ...]]] = []
+    for scene, job, program, design in evaluations:
+        if job.members:
+            continue
+        with contextlib.suppress(ArithmeticError, BadInput, TypeError, ValueError):
+            sampler = job.sampler(scene, design)
+            sampler.share()
+            samplers.append((sampler, _evaluated_quantities(job, program, sampler, every=True)))
+    search_extremes(samplers)
+
+
+def _evaluated_quantities(job: Job, program: Program, sampler: Sampler, every: bool) -> tuple[str, ...]:
+    """Whole-cycle quantities that an evaluation reads; every: those of all figures."""
+    names = [limit.row for limit in program.cycle_limits.values() if not limit.hidden]
+    names += [name for objective in program.objectives for name in objective.quantities]
+    names += job.peaks(sampler.model).values() if every else []
+    return tuple(name for name in dict.fromkeys(names) if sampler.model.has_quantity(name))
 
 
 def _findings(

@@ -17,7 +17,7 @@ least (`valley`); the curvature then has an error, and is zero if it is within t
 import functools
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
@@ -31,7 +31,7 @@ from loomopt.physics.cycle import Floats
 from loomopt.physics.tolerances import FEASIBLE, FLAT, POLISH_DONE, POLISH_EXCESS, RANK
 from loomopt.solving.certificate.derivatives import Derivatives, JetDerivatives
 from loomopt.solving.certificate.kkt import ActiveRow, ActiveSet, LevelMultipliers, System, move_rows
-from loomopt.solving.nlp.point import sampler_at
+from loomopt.solving.nlp.point import sampler_at, search_extremes
 from loomopt.solving.search import tie_break
 
 SLOPE_ERROR = 1e-12
@@ -263,33 +263,41 @@ class FeasibleCurve:
             return "falls" if any(map(self._keeps_limits, better)) else "open"
         return "holds" if not any(clear) and falls[0] < FALL_GROWTH * falls[-1] else "open"
 
-    def _slopes(self, lagrangian: Lagrangian, lines: Floats, place: Floats) -> Floats | None:
-        """Slopes of the Lagrangian along lines (k, c) at coordinates in the basis."""
-        step, slopes = PROBES[-1], []
-        for line in lines.T:
-            ends = [self.at(place + sign * step * line) for sign in (1.0, -1.0)]
-            high, low = (lagrangian.value(x) if x else None for x in ends)
-            if high is None or low is None:
-                return None
-            slopes.append((high - low) / (2 * step))
-        return np.array(slopes)
+    def at(self, places: Sequence[Floats]) -> list[Design | None]:
+        """Designs (SI) at coordinates (k,) in the basis that keep the rows; None where the iteration fails.
 
-    def at(self, place: Floats) -> Design | None:
-        """Design (SI) at coordinates (k,) in the basis that keeps the rows; None where the iteration fails."""
-        step, last_residual = self.basis @ place, math.inf
+        The designs of a step are sampled in one pass.
+        """
+        designs: list[Design | None] = [None] * len(places)
+        steps, last_residuals = [self.basis @ place for place in places], [math.inf] * len(places)
+        moving = list(range(len(places)))
         for _ in range(STEPS):
-            x = self._design(step)
-            sampler = sampler_at(self.program, x)
-            values = None if sampler is None else self._values(sampler)
-            valley_step = self._valley_step(x)
-            if values is None or self._here is None or valley_step is None:
-                return None
-            residuals = self.sums @ (values - self._here)
-            largest = float(np.abs(residuals).max(initial=0.0))
-            if not np.any(valley_step) and (largest <= POLISH_DONE or last_residual <= 2 * largest):
-                return x if largest <= POLISH_EXCESS else None
-            step, last_residual = step - self._back @ residuals + valley_step, largest
-        return None
+            here = [self._design(steps[k]) for k in moving]
+            samplers = [sampler_at(self.program, x) for x in here]
+            search_extremes((sampler, self._moving_quantities) for sampler in samplers)
+            left: list[int] = []
+            for k, x, sampler in zip(moving, here, samplers, strict=True):
+                values = None if sampler is None else self._values(sampler)
+                valley_step = self._valley_step(x)
+                if values is None or self._here is None or valley_step is None:
+                    continue
+                residuals = self.sums @ (values - self._here)
+                largest = float(np.abs(residuals).max(initial=0.0))
+                if not np.any(valley_step) and (largest <= POLISH_DONE or last_residuals[k] <= 2 * largest):
+                    designs[k] = x if largest <= POLISH_EXCESS else None
+                    continue
+                steps[k], last_residuals[k] = steps[k] - self._back @ residuals + valley_step, largest
+                left.append(k)
+            moving = left
+            if not moving:
+                break
+        return designs
+
+    @lazy
+    def _moving_quantities(self) -> tuple[str, ...]:
+        """Quantities whose extremes move along a piece."""
+        moving = (row.reads for row in self.rows if row.node and row.node.u not in (0.0, 1.0))
+        return tuple(dict.fromkeys(moving))
 
     def _valley_step(self, x: Mapping[str, float]) -> Floats | None:
         """Step (variables,) from a design (SI) to the valley, 0 where it is reached; None where unknown.
@@ -314,11 +322,14 @@ class FeasibleCurve:
 
     def _lowest(self, lagrangian: Lagrangian, step: float, way: Floats) -> list[Design]:
         """Designs a step along a direction: the plain one, and one moved to the least along curved directions."""
-        slopes = self._slopes(lagrangian, self.curved, step * way)
-        places = [step * way]
-        if slopes is not None and np.any(slopes):
-            places.append(step * way - self.curved @ (slopes / self.bends))
-        return [x for x in map(self.at, places) if x]
+        place, probe = step * way, PROBES[-1]
+        ends = [place + sign * probe * line for line in self.curved.T for sign in (1.0, -1.0)]
+        plain, *designs = self.at([place, *ends])
+        values = [lagrangian.value(x) if x else None for x in designs]
+        known = [value for value in values if value is not None]
+        slopes = np.subtract(known[::2], known[1::2]) / (2 * probe) if len(known) == len(values) else np.zeros(0)
+        lowest = self.at([place - self.curved @ (slopes / self.bends)]) if np.any(slopes) else []
+        return [x for x in (plain, *lowest) if x]
 
     def _keeps_limits(self, x: Mapping[str, float]) -> bool:
         """Whether a design keeps every limit as well as x does."""

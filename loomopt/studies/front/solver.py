@@ -174,12 +174,19 @@ class Solver:
         for request, (*optima, share) in zip(requests, ends, strict=True):
             first, second = map(neighbour_newton.read_optimum, optima)
             tasks.append(neighbour_newton.NeighbourTask(self._begun(request), first, second, share, self._peaks))
-        searches = zip(requests, neighbour_newton.solve_neighbours(tasks), strict=True)
+        searches = neighbour_newton.solve_neighbours(tasks)
+        accepted = [
+            search if search and self._priced(search, request) and fallback.is_no_worse_than_today(search) else None
+            for request, search in zip(requests, searches, strict=True)
+        ]
+        report.search_evaluated(
+            (self.scene, self.job, self.base, self.job.design(search.program, search.best.x))
+            for search in accepted
+            if search and search.best
+        )
         return [
-            self._result(search, request_of_search)
-            if search and self._priced(search, request_of_search) and fallback.is_no_worse_than_today(search)
-            else None
-            for request_of_search, search in searches
+            self._result(search, request) if search else None
+            for request, search in zip(requests, accepted, strict=True)
         ]
 
     def moved(self, requests: Sequence[Subproblem], ends: Sequence[Sequence[Any]]) -> list[Moved | None]:

@@ -65,7 +65,7 @@ def curve(rows, limits, sums, curved=(), waves=None, **x):
 @pytest.mark.parametrize("step", [1e-2, -0.3])
 def test_steps_are_corrected_onto_what_binds(step):
     _, result = curve(ROUND, (("r", 0, 1.0),), [[1.0]], x=0.6, y=0.8)
-    there = result.at(np.array([step]))
+    (there,) = result.at([np.array([step])])
     assert np.hypot(there["x"], there["y"]) == pytest.approx(1.0, abs=1e-12)
     way = result.basis[:, 0]
     assert (np.array([there["x"], there["y"]]) - [0.6, 0.8]) @ way == pytest.approx(step, abs=1e-14)
@@ -73,7 +73,7 @@ def test_steps_are_corrected_onto_what_binds(step):
 
 def test_no_design_is_made_up_where_nothing_keeps_what_binds():
     _, result = curve(ROUND, (("r", 0, 1.0),), [[1.0]], x=0.6, y=0.8)
-    assert result.at(np.array([2.0])) is None
+    assert result.at([np.array([2.0])]) == [None]
 
 
 @pytest.mark.parametrize(("fourth", "verdict"), [(0.9, "falls"), (1.1, "holds")])
@@ -95,7 +95,7 @@ def test_extremes_of_the_cycle_move_along(sign):
     sums = [[float(k == sign) for k in range(2)]]
     _, result = curve({"f": ROUND["f"]}, (("wave", 1, 1.0),), sums, waves={"wave": wave}, x=1.0, y=0.0)
     assert [row.sign for row in result.rows[:2]] in ([1.0, -1.0], [-1.0, 1.0])
-    assert result.at(np.array([0.02]))["x"] == pytest.approx(np.sqrt(1 - 0.02**2), abs=1e-12)
+    assert result.at([np.array([0.02])])[0]["x"] == pytest.approx(np.sqrt(1 - 0.02**2), abs=1e-12)
 
 
 @pytest.mark.slow
