@@ -174,4 +174,4 @@ def tells(scene: Scene) -> bool:
 
 
 def _tells_forces(effect: object) -> bool:
-    return isinstance(effect, Check) and any(figure.kind == "force" for figure in effect.figures)
+    return isinstance(effect, Check) and bool(effect.vectors or effect.directed)

@@ -9,7 +9,7 @@ from loomopt.base.errors import BadInput, unknown
 from loomopt.maths.systems import Number
 from loomopt.model.limits import Limit
 from loomopt.model.model import DesignRow, Formula, Instant, JobModel
-from loomopt.model.objectives import Magnitude, Objective, Peak, Value, Worst, opposite
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value, Worst, WorstPeak, opposite
 from loomopt.model.program import Program
 from loomopt.physics.schema import Axis, Sense
 
@@ -100,7 +100,8 @@ def with_axes(
         if opposed:
             program = replace(program, model=opposing(program.model, rows))
             rows = tuple(map(opposite, rows))
-        objective = _objective(name, rows, FORMS[form], size(name) ** (2 if square else 1), axis.power)
+        scale = size(name) ** (axis.power if FORMS[form] is Peak else 1)
+        objective = _objective(name, rows, FORMS[form], scale, axis.power)
         traded_axes.append(Traded(axis, sense, objective))
     levels = (*program.objectives, *(traded.objective for traded in traded_axes))
     return replace(program, objectives=levels), tuple(traded_axes)
@@ -109,6 +110,8 @@ def with_axes(
 def _objective(name: str, rows: Sequence[str], kind: type[Objective], scale: float, power: int) -> Objective:
     """Objective of an axis; of several rows the worst counts."""
     first, *others = rows
+    if others and kind is Peak:
+        return WorstPeak(name, first, scale, tuple(others), power=power)
     return Worst(name, first, scale, tuple(others), power=power) if others else kind(name, first, scale, power=power)
 
 

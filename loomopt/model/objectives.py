@@ -226,6 +226,31 @@ class Peak(Objective):
         return [CycleLimit(name, 1, self.row, most, self.scale)]
 
 
+@dataclass(frozen=True)
+class WorstPeak(Peak):
+    """Minimum of the largest of several peaks; others: the quantities after the first."""
+
+    others: tuple[str, ...]
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        """All its quantities."""
+        return (self.row, *self.others)
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """The quantities."""
+        return self.rows
+
+    def watched(self, designs: BatchReading) -> Floats:
+        """Quantities at the sampled nodes, SI, (nodes of all, designs)."""
+        return np.concatenate([np.asarray(designs.looked(row)) for row in self.rows])
+
+    def limits(self, name: str, most: float) -> list[Limit]:
+        """Limit of each quantity at `most`, SI."""
+        return [CycleLimit(name, 1, row, most, self.scale) for row in self.rows]
+
+
 def opposite(row: str) -> str:
     """Name of the negative of a row, whose minimum is the maximum of the row."""
     return f"-{row}"

@@ -4,10 +4,12 @@ import math
 from collections.abc import Container, Mapping
 from typing import TYPE_CHECKING, Any, final
 
+import numpy as np
+
 from loomopt.jobs import base
 from loomopt.jobs.base import EVERY, Figures, InBox, Job, Studied
 from loomopt.jobs.linkage import scene as scenes
-from loomopt.jobs.linkage.model import OBLIQUITY, linkage_of
+from loomopt.jobs.linkage.model import OBLIQUITY, RADIUS, PeaksOf, lift_of, linkage_of, roller_peaks
 from loomopt.jobs.linkage.program import LinkageTask, model
 from loomopt.maths import periodic_cubic
 from loomopt.maths.periodic_cubic import TURN
@@ -26,7 +28,7 @@ from loomopt.scenes.tables import SceneSchema
 if TYPE_CHECKING:
     from loomopt.model.machines import Machines
 
-LEAST = ("x_min.", "y_min.")
+LEAST = ("x_min.", "y_min.", "radius_min.")
 
 
 @final
@@ -59,12 +61,20 @@ class LinkageJob(Job):
     ) -> dict[str, Number]:
         """Every figure of a machine, or of many, SI; None for one whose numbers the scene does not have."""
         peaks = {name: of for name, of in self.peaks(sampled.model).items() if name in names}
-        sampled.search(tuple(peaks.values()))
+        pressed = {name: of for name, of in of_rollers(sampled.model).items() if name in names}
+        sampled.search((*peaks.values(), *{quantity for of in pressed.values() for quantity in of.quantities}))
         figures = base.static_figures(scene, sampled, names)
         if CHANGE in figures:
             task = LinkageTask(scene)
             figures[CHANGE] = change.figure(task.changing, sampled.values, task.known, task.limited, task.weights)
+        for name, of in pressed.items():
+            heights: list[Number] = [0.0, *map(sampled.peak, of.quantities)]
+            figures[name] = np.max(np.stack(np.broadcast_arrays(*heights)), axis=0) ** (1 / of.power)
         return figures | {name: self.read(name, sampled.peak(quantity)) for name, quantity in peaks.items()}
+
+    def over_cycle(self, model: JobModel) -> dict[str, str]:
+        """Figures that are read over the cycle; those of contacts are the largest of several quantities."""
+        return {**super().over_cycle(model), **dict.fromkeys(of_rollers(model), "")}
 
     def read(self, name: str, peak: Number) -> Number:
         """Figure of a quantity's largest value, SI."""
@@ -75,7 +85,9 @@ class LinkageJob(Job):
     def peaks(self, model: JobModel) -> dict[str, str]:
         """Figures that are extremes over the cycle."""
         peaks = {name: name for name in model.quantities}
-        peaks |= {name: name for name in model.signed}
+        of_contacts = {q for figure, of in of_rollers(model).items() if figure != RADIUS for q in of.quantities}
+        of_contacts |= {lift_of(roller.name) for roller in linkage_of(model).chain.rollers}
+        peaks |= {name: name for name in model.signed if name not in of_contacts}
         return peaks | {f"mu.{part}": f"{part}.{OBLIQUITY}" for part in linkage_of(model).oblique}
 
     def in_boxes(self, scene: Scene, model: JobModel) -> dict[str, InBox]:
@@ -157,6 +169,11 @@ class LinkageJob(Job):
         """Quantities that studies show."""
         quantities = super().studied(scene)
         return quantities._replace(peaks={name: (name, False) for name in self.model(scene).quantities})
+
+
+def of_rollers(model: JobModel) -> dict[str, PeaksOf]:
+    """Figures that are the largest of several quantities of the rollers."""
+    return roller_peaks(linkage_of(model), model.effects, model.known)
 
 
 def _order(order: int) -> Formula:

@@ -18,20 +18,20 @@ from loomopt.base.records import lazy
 from loomopt.maths import systems, turning_points
 from loomopt.maths.systems import FLOAT, Maths, Number, within_turn
 from loomopt.model import drive
-from loomopt.model.kinematics import Arcs, Followed, Following, Group, Kinematics
-from loomopt.model.model import CycleQuantity, DesignRow, Instant, Integral, JobModel
+from loomopt.model.kinematics import Arcs, DerivedChain, Followed, Following, Group, Kinematics
+from loomopt.model.model import CycleQuantity, DesignRow, Formula, Instant, Integral, JobModel
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import TURN, Floats, Node, Where
 from loomopt.physics.effects.coulomb import TURNS
-from loomopt.physics.effects.kinds import Effect, Load, Motion, State
+from loomopt.physics.effects.kinds import Check, Effect, Load, Motion, State
 from loomopt.physics.mechanisms import chain
-from loomopt.physics.mechanisms.cam_laws import LAWS
-from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch
+from loomopt.physics.mechanisms.cam_moves import CamState, stretch
+from loomopt.physics.mechanisms.cam_roller import RollerContact
+from loomopt.physics.mechanisms.chain import Chain, Part, Ref, cam_switch, moves_of
 from loomopt.physics.mechanisms.dead_centres import CrankRockerGroup, crank_rockers
-from loomopt.physics.mechanisms.dwell_cam import stretch
 from loomopt.physics.mechanisms.dyad import Vector, cross, dot
 from loomopt.physics.mechanisms.moving import Joint, Link, turned_by
-from loomopt.physics.schema import Values
+from loomopt.physics.schema import Axis, Figure, Values
 from loomopt.physics.tolerances import ASSEMBLY_MARGIN, SAME_ANGLE
 
 OBLIQUITY = "obliquity"
@@ -216,7 +216,7 @@ class LinkageMotion(Motion):
     """Motion of the linkage at crank angles φ, rad, of any shape; quantities are computed when they are read.
 
     joints: its parts; factor: factor of the output, None for 1; zero: direction from which an angle is counted.
-    carried: motion of the parts on the output, None for that of the output.
+    carried: motion of the parts on the output, None for that of the output; contacts: of each roller with its cam.
     """
 
     joints: chain.ChainPose
@@ -225,6 +225,7 @@ class LinkageMotion(Motion):
     omega_dot: Number = None
     factor: Number = None
     zero: Number = None
+    contacts: "Callable[[Part], RollerContact] | None" = None
     carried: Motion | None = None
 
     def with_carried(self, motion: Motion) -> "LinkageMotion":
@@ -268,6 +269,11 @@ class LinkageMotion(Motion):
         if self.output.measure != "angle":
             return self.q - given[output_value(event, "q")]
         return self._turned(Vector(given[output_value(event, "x")], given[output_value(event, "y")]))
+
+    def contact(self, roller: Part) -> RollerContact:
+        """Roller and its cam."""
+        assert self.contacts is not None
+        return self.contacts(roller)
 
     def order(self, order: int) -> Number:
         """Output or a derivative of it with respect to φ."""
@@ -413,8 +419,34 @@ class Linkage(Kinematics):
     def arcs(self) -> tuple[Arcs, ...]:
         """Intervals of each cam, each with its own formula."""
         return tuple(
-            Arcs(cam_switch(cam), functools.partial(self._cam_corners, cam), stretch, cam) for cam in self.chain.cams
+            Arcs(cam_switch(cam), functools.partial(self._cam_corners, cam), stretch, cam, self._splines_of(cam))
+            for cam in self.chain.cams
         )
+
+    def _splines_of(self, cam: Part) -> DerivedChain | None:
+        """The knots of the splines of a cam; None with other cams, or with laws that may jump at their ends."""
+        moves, roots = moves_of(cam), chain.cam_knots(cam)
+        if not roots or len(self.chain.cams) > 1 or any(move.law for move in moves):
+            return None
+        names = tuple(name for k in range(len(moves)) for name in chain.state_names(cam, k))
+        count = sum(len(move.pieces) for move in moves)
+        stations = tuple({cam_switch(cam): float(k)} for k in range(count + 1))
+        return DerivedChain(frozenset(roots), names, functools.partial(self._follow, cam), stations)
+
+    def _follow(self, cam: Part, maths: Maths, values: Values) -> dict[str, Number]:
+        """States at the knots of a cam's splines, each from the known one before it."""
+        return self._states(cam, self.chain.motion(cam, maths, values).followed)
+
+    def _states(self, cam: Part, states: Callable[[int], Sequence[CamState]]) -> dict[str, Number]:
+        moves, named = moves_of(cam), dict[str, Number]()
+        for k in (k for k, move in enumerate(moves) if move.intervals > 1):
+            named |= chain.named_states(cam, k, states(k))
+        return named
+
+    @lazy
+    def rollers(self) -> "tuple[RollerFigures, ...]":
+        """Rollers on cams."""
+        return tuple(map(RollerFigures, self.chain.rollers))
 
     @lazy
     def rocker(self) -> CrankRockerGroup | None:
@@ -491,8 +523,12 @@ class Linkage(Kinematics):
         return tuple(part.name for part in self.chain.parts if chain.has_transmission_angle(part))
 
     def derived(self, maths: Maths, given: Given, called: Collection[str]) -> dict[str, Number]:
-        """Crank angle of each event, rad."""
+        """Crank angle of each event, rad, and the knots of free cam laws."""
         values: dict[str, Number] = {}
+        for cam in self.chain.cams:
+            if chain.cam_knots(cam):
+                values |= self._states(cam, self.chain.motion(cam, maths, given.values).spline)
+        given = given._replace(values={**given.values, **values}) if values else given
         for place in self.places:
             if place.angle is not None:
                 values[place.value] = number(maths, given.values, place.angle)
@@ -686,12 +722,17 @@ class Linkage(Kinematics):
         """Sentence on a corner of a cam, such as "the return of follower begins"."""
         place = corner.place
         for cam in self.chain.cams:
-            pieces = len(LAWS[cam.word("law")].breaks) + 1
-            if place < 2 * (pieces + 1):
-                motion, piece = ("rise", place) if place <= pieces else ("return", place - pieces - 1)
-                does = {0: "begins", pieces: "ends"}.get(piece, "passes to its next piece")
-                return f"the {motion} of {cam.name} {does}"
-            place -= 2 * (pieces + 1)
+            moves = moves_of(cam)
+            names = [f"move {k}" for k in range(1, len(moves) + 1)] if cam.moves else ["rise", "dwell", "return"]
+            words = []
+            for k, (name, move) in enumerate(zip(names, moves, strict=True)):
+                does = f"the {name} of {cam.name} begins"
+                words.append(f"the {names[k - 1]} of {cam.name} ends" if k and move.law is None else does)
+                words += [f"the {name} of {cam.name} passes to its next piece"] * (len(move.pieces) - 1)
+            words.append(f"the {names[-1]} of {cam.name} ends")
+            if place < len(words):
+                return words[place]
+            place -= len(words)
         raise ValueError(f"the cams have no corner {corner.place}")
 
     def _scan(self, given: Given) -> tuple[Node, dict[int, Corner]]:
@@ -818,7 +859,8 @@ class Linkage(Kinematics):
         joints = self.chain.pose(maths, values, node.phi, node.switch)
         factor = None if out.scale is None else number(maths, values, out.scale)
         zero = None if out.zero is None else number(maths, values, out.zero)
-        return LinkageMotion(joints, out, values.get("speed"), values.get("omega_dot"), factor, zero)
+        contacts = functools.cache(lambda roller: self.chain.contact(roller, joints)) if self.chain.rollers else None
+        return LinkageMotion(joints, out, values.get("speed"), values.get("omega_dot"), factor, zero, contacts)
 
     def at_event(self, maths: Maths, given: Given, event: str) -> LinkageMotion:
         """Pose at an event."""
@@ -974,6 +1016,156 @@ class Reach(NamedTuple):
         return coordinate if self.sign > 0 else -coordinate
 
 
+class RollerFigures(NamedTuple):
+    """Figures of a roller and its cam; roller: the part."""
+
+    roller: Part
+
+    def figures(self) -> list[Figure]:
+        """Figures by name."""
+        name = self.roller.name
+        return [
+            Figure(f"pressure_angle.{name}", "angle", f"peak pressure angle of roller {name}", sides=("max",)),
+            Figure(
+                f"undercut.{name}",
+                "number",
+                f"largest curvature of the path of roller {name} in its cam, times its radius: at 1 undercut",
+                sides=("max",),
+            ),
+            Figure(f"radius_max.{name}", "length", f"largest radius of the cam of roller {name}", sides=("max",)),
+            Figure(f"radius_min.{name}", "length", f"least radius of the cam of roller {name}", sides=("min",)),
+        ]
+
+    def axes(self) -> list[Axis]:
+        """Figures that a front trades."""
+        name = self.roller.name
+        return [
+            *(Axis(f"{key}.{name}", kind, (), "peak", ("least",)) for key, kind in _ROLLER_PEAKS.items()),
+            Axis(f"radius_min.{name}", "length", (), "peak", ("most",), -1),
+        ]
+
+    def quantities(self) -> dict[str, CycleQuantity]:
+        """Whole-cycle quantities by name; the least radius has the opposite sign."""
+        name = self.roller.name
+
+        def read(key: str, sign: int = 1) -> Formula:
+            return lambda at: sign * getattr(at.pose.contact(self.roller), key)
+
+        return {
+            f"pressure_angle.{name}": CycleQuantity(read("pressure_angle")),
+            f"undercut.{name}": CycleQuantity(read("undercut"), signed=True),
+            f"radius_max.{name}": CycleQuantity(read("reach"), signed=True),
+            f"radius_min.{name}": CycleQuantity(read("reach", -1), figure=False, signed=True),
+        }
+
+
+def spline_row(cam: Part, k: int, derivative: str) -> str:
+    """Name of the row by which the spline of a move ends in the state that it must reach."""
+    return f"{cam.name}: move {k + 1} ends with its {derivative}"
+
+
+def spline_sizes(linked: Chain, values: Values) -> dict[str, float]:
+    """Rows of the ends of all splines, with their scales: the travel of the cam over the angle of the move."""
+    sizes = dict[str, float]()
+    for cam in linked.cams:
+        motion = linked.motion(cam, FLOAT, values)
+        travel = max(abs(float(end.angle)) for end in motion.cam.ends)
+        for k in (k for k, move in enumerate(motion.cam.moves) if move.intervals > 1):
+            turn = float(motion.cam.turns[k])
+            scales = {"angle": travel, "slope": travel / turn, "bend": travel / turn**2}
+            sizes |= {spline_row(cam, k, name): scales[name] for name in motion.gaps(k)}
+    return sizes
+
+
+def _spline_rows(linked: Chain) -> dict[str, DesignRow]:
+    """Rows of the ends of all splines."""
+
+    def row(cam: Part, k: int, name: str) -> DesignRow:
+        return DesignRow(lambda at: linked.motion(cam, at.maths, at.values).gaps(k)[name])
+
+    rows = dict[str, DesignRow]()
+    for cam in linked.cams:
+        for k, move in enumerate(moves_of(cam)):
+            if move.intervals > 1:
+                names = ("angle", "slope") if move.open_end else ("angle", "slope", "bend")
+                rows |= {spline_row(cam, k, name): row(cam, k, name) for name in names}
+    return rows
+
+
+class PeaksOf(NamedTuple):
+    """Figure that is the largest of several quantities over the cycle, to a power; none of them is negative there."""
+
+    quantities: tuple[str, ...]
+    power: int = 1
+
+
+CONTACT = "contact"
+"""The effect with the forces of rollers."""
+
+
+RADIUS = "radius_max"
+"""Largest radius of all cams with rollers."""
+
+
+def roller_peaks(linkage: Linkage, effects: Sequence[Effect], known: Collection[str]) -> dict[str, PeaksOf]:
+    """Figures of all rollers together, and of their contacts, by name; known: names of scene numbers that are given."""
+    names = [roller.name for roller in linkage.chain.rollers]
+    radii = {RADIUS: PeaksOf(tuple(f"{RADIUS}.{name}" for name in names))} if names else {}
+    return radii | _contact_peaks(names, effects, known)
+
+
+def _contact_peaks(names: Sequence[str], effects: Sequence[Effect], known: Collection[str]) -> dict[str, PeaksOf]:
+    if not any(effect.name == CONTACT for effect in effects):
+        return {}
+    ways = ("alone", "shared") if f"{CONTACT}.preload" in known else ("alone",)
+    forces = {name: tuple(f"force of {name} {way}" for way in ways) for name in names}
+    peaks = {f"force.{name}": PeaksOf(of) for name, of in forces.items()}
+    if f"{CONTACT}.width" in known:
+        squares = {name: tuple(f"pressure^2 of {name} {way}" for way in ways) for name in names}
+        peaks |= {f"hertz.{name}": PeaksOf(of, 2) for name, of in squares.items()}
+        peaks["hertz"] = PeaksOf(tuple(itertools.chain.from_iterable(squares.values())), 2)
+    return peaks
+
+
+def lift_of(roller: str) -> str:
+    """Name of the quantity that is above 0 where a lone roller leaves its cam: the force on it, with opposite sign."""
+    return f"lift of {roller}"
+
+
+def _contact_quantities(
+    linkage: Linkage, effects: Sequence[Effect], peaks: Mapping[str, PeaksOf]
+) -> dict[str, CycleQuantity]:
+    """Quantities of the contacts: of each roller its force, and the square of its pressure."""
+    check = next((effect for effect in effects if isinstance(effect, Check) and effect.name == CONTACT), None)
+    if check is None:
+        return {}
+
+    def lift(roller: Part) -> CycleQuantity:
+        return CycleQuantity(lambda at: -at.joints(check).alone(roller), figure=False, signed=True, loaded=True)
+
+    def quantity(roller: Part, way: str, pressed: bool) -> CycleQuantity:
+        def value(at: Instant) -> Number:
+            forces = at.joints(check)
+            force = getattr(forces, way)(roller)
+            return forces.pressure_square(roller, force) if pressed else force
+
+        return CycleQuantity(value, figure=False, signed=True, loaded=True)
+
+    read = {name for figure, of in peaks.items() if figure != RADIUS for name in of.quantities}
+    made = {
+        f"{sort} of {roller.name} {way}": (roller, way, sort != "force")
+        for roller in linkage.chain.rollers
+        for way in ("alone", "shared")
+        for sort in ("force", "pressure^2")
+    }
+    lifts = {lift_of(roller.name): lift(roller) for roller in linkage.chain.rollers}
+    return {name: quantity(*made[name]) for name in read} | lifts
+
+
+_ROLLER_PEAKS = {"pressure_angle": "angle", "undercut": "number", "radius_max": "length"}
+"""Figures of a roller that are largest values, with their kinds of quantity."""
+
+
 def _window_travel(window: Window, at: Instant) -> Number:
     pose = window.coordinate(at.pose)
     if window.value is None:
@@ -1099,6 +1291,9 @@ def model(
         quantities["torque_square"] = CycleQuantity(lambda at: at.crank_torque**2, figure=False)
         parted = linkage.chain.cams or any(isinstance(effect, Load) and effect.corners for effect in effects)
         means.append(Integral(TORQUE_SQUARE, RMS_TORQUE, "torque_square", parts=1 if parted else SMOOTH))
+    for roller in linkage.rollers:
+        quantities |= roller.quantities()
+    quantities |= _contact_quantities(linkage, effects, roller_peaks(linkage, effects, known))
     quantities |= {reach.name: CycleQuantity(reach.value, figure=False, signed=True) for reach in reaches}
     loaded = any(isinstance(effect, Load | State) and effect.acts == "output" for effect in effects)
     switches = {effect.name for effect in effects} | {window.switch for window in windows}
@@ -1115,6 +1310,7 @@ def model(
     for place in linkage.places:
         if place.extreme and not place.of:
             rows[bend_row(place.name)] = DesignRow(functools.partial(_bend, place.name))
+    rows |= _spline_rows(linkage.chain)
     high, low = extremes(linkage.places)
     if high and low:
         rows["swing"] = DesignRow(functools.partial(_swing, high, low))

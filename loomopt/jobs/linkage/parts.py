@@ -4,6 +4,7 @@ A number of a part is the name of one in [mechanism], its opposite ("-d"), a mul
 with its unit; the kind of quantity of a name follows from its uses.
 """
 
+import itertools
 import math
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -12,12 +13,14 @@ from typing import Annotated, Any, NamedTuple
 from loomopt.base.errors import GAP, WHOLE, BadInput, Faults, nearest, shown
 from loomopt.base.quantities import Angle, Coordinate, PositiveLength, Quantity, described
 from loomopt.physics.mechanisms import chain
-from loomopt.physics.mechanisms.cam_laws import LAWS
-from loomopt.physics.mechanisms.chain import FRAME_NAME, Chain, Part, Ref
+from loomopt.physics.mechanisms.cam_laws import LAWS, TURN_LAWS
+from loomopt.physics.mechanisms.cam_moves import Move
+from loomopt.physics.mechanisms.chain import FRAME_NAME, NOTHING, SENSES, Chain, Part, Ref
 from loomopt.scenes.cursor import Cursor
 
 PositiveAngle = Annotated[float, Quantity("angle", above=0, below=2 * math.pi)]
 DwellAngle = Annotated[float, Quantity("angle", least=0, below=2 * math.pi)]
+SignedNumber = Annotated[float, Quantity("number")]
 
 Json = dict[str, Any]
 Kind = Any
@@ -52,11 +55,11 @@ class WordKey(NamedTuple):
 
 
 JOINT, LINK, NEW_JOINT, NEW_LINK = "joint", "link", "new joint", "new link"
-RATIO, WHOLE_RATIO, LAW, PAIR = "ratio", "whole ratio", "law", "two joints"
+RATIO, WHOLE_RATIO, PAIR = "ratio", "whole ratio", "two joints"
+LAW, MOVE_LAW, KNOTS = "law", "law of a move", "intervals"
 ONE_LINK, TWO_LINKS, LEFT_RIGHT, AHEAD_BEHIND = "one link", "two links", "left or right", "ahead or behind"
 SLIDE, EVENT, ANGLE = "slider or slot", "event", "angle"
 SENSE, EXTREME, REST = "sense", "extreme", "end of a rest"
-SENSES = {"forward": 1, "backward": -1, "counter-clockwise": 1, "clockwise": -1}
 Keys = Mapping[str, WordKey | NumberKey]
 """Keys of a table, in the order shown."""
 
@@ -120,9 +123,35 @@ KEYS: Mapping[str, Keys] = {
         "rise": NumberKey(PositiveAngle, "crank angle over which cam follower {} rises", True),
         "far_dwell": NumberKey(DwellAngle, "crank angle over which cam follower {} stays up"),
         "return": NumberKey(PositiveAngle, "crank angle over which cam follower {} returns", True),
+        "shaft": WordKey(JOINT),
+        "sense": WordKey(SENSE),
+    },
+    "roller": {
+        "at": WordKey(JOINT, True),
+        "cam": WordKey(LINK, True),
+        "radius": NumberKey(PositiveLength, "radius of roller {}", True),
     },
 }
-"""Keys of each kind of part, in the order shown."""
+"""Keys of each kind of part, in the order shown; of a cam in its short form."""
+_SHORT = ("law", "lift", "rise", "far_dwell", "return")
+LISTED_CAM: Keys = {
+    **{key: entry for key, entry in KEYS["cam"].items() if key not in _SHORT},
+    "begins": NumberKey(Angle, "crank angle where the first move of cam follower {} begins"),
+}
+"""Keys of a cam that lists its moves, beside the list `moves`."""
+MOVE_KEYS: Keys = {
+    "angle": NumberKey(PositiveAngle, "crank angle that {} takes", True),
+    "to": NumberKey(Angle, "angle of the follower at the end of {}"),
+    "law": WordKey(MOVE_LAW),
+    "slope": NumberKey(SignedNumber, "first derivative of the follower's angle at the end of {}"),
+    "bend": NumberKey(SignedNumber, "second derivative of the follower's angle at the end of {}"),
+    "jerk": NumberKey(SignedNumber, "third derivative of the follower's angle at the end of {}"),
+    "knots": WordKey(KNOTS),
+}
+"""Keys of a move of a cam; without `to` it is a dwell."""
+_DERIVATIVES = ("slope", "bend", "jerk")
+MOST_KNOTS = 64
+"""Intervals of the spline of a move."""
 
 # Names and numbers, for the scene's other tables too.
 
@@ -291,6 +320,14 @@ def _whole_ratio(cursor: Cursor) -> int:
     return ratio
 
 
+def _intervals(cursor: Cursor) -> int:
+    raw = cursor.raw
+    if not isinstance(raw, int) or isinstance(raw, bool) or not 2 <= raw <= MOST_KNOTS:
+        remedy = "It is the number of intervals of a free law, at whose knots it is designed"
+        raise cursor.fault("it is not a number of intervals", raw, f"a whole number from 2 to {MOST_KNOTS}", remedy)
+    return raw
+
+
 def number_schema(number: NumberKey) -> Json:
     """JSON Schema of a number of the linkage: a quantity, or the name of a number of [mechanism]."""
     quantity = number.kind.__metadata__[0].schema()
@@ -320,6 +357,8 @@ _SORTS: Mapping[str, Sort] = {
     WHOLE_RATIO: Sort(_whole_ratio, Quantity("number").schema),
     ANGLE: Sort(lambda cursor: cursor.number(Quantity("angle")), Quantity("angle").schema),
     LAW: _choice(*LAWS),
+    MOVE_LAW: _choice(*LAWS, *TURN_LAWS),
+    KNOTS: Sort(_intervals, lambda: {"type": "integer", "minimum": 2, "maximum": MOST_KNOTS}),
     PAIR: Sort(_pair, _pair_schema),
     ONE_LINK: _links(1, '{ rod = "l2" }'),
     TWO_LINKS: _links(2, '{ rod = "l2", rocker = "l3" }'),
@@ -345,7 +384,10 @@ def keys_schema(known: Keys, kind: str = "") -> Json:
 def schema() -> Json:
     """JSON Schema of [parts]."""
     rules: list[Json] = [
-        {"if": {"properties": {"kind": {"const": kind}}}, "then": keys_schema(known, kind)}
+        {
+            "if": {"properties": {"kind": {"const": kind}}},
+            "then": _cam_schema() if kind == "cam" else keys_schema(known, kind),
+        }
         for kind, known in KEYS.items()
     ]
     part: Json = {
@@ -356,6 +398,14 @@ def schema() -> Json:
     }
     names: Json = {"propertyNames": NAME_SCHEMA, "minProperties": 1, "maxProperties": MOST_PARTS}
     return {"type": "object", "additionalProperties": part, **names}
+
+
+def _cam_schema() -> Json:
+    """JSON Schema of a cam, which lists its moves or gives rise, dwell and return."""
+    listed = keys_schema(LISTED_CAM, "cam")
+    moves: Json = {"type": "array", "minItems": 2, "maxItems": MOST_PARTS, "items": keys_schema(MOVE_KEYS)}
+    listed |= {"properties": listed["properties"] | {"moves": moves}, "required": [*listed["required"], "moves"]}
+    return {"if": {"required": ["moves"]}, "then": listed, "else": keys_schema(KEYS["cam"], "cam")}
 
 
 class TableEntries(NamedTuple):
@@ -406,8 +456,15 @@ def _part(name: str, cursor: Cursor, numbers: Numbers) -> Part | None:
         check_name(cursor, name, {FRAME_NAME: "what does not move"})
     with faults:
         kind = _kind(cursor)
-        read = entries(cursor, KEYS[kind], numbers, f"a {kind}", name)
-        part = Part(kind, name, tuple(read.words.items()), tuple(read.numbers.items()))
+        listed = kind == "cam" and cursor.at("moves").raw is not None
+        moves = _moves(cursor.at("moves"), numbers, name) if listed else NO_MOVES
+        table = {key: value for key, value in cursor.table().items() if key != "moves"} if listed else cursor.raw
+        keys = LISTED_CAM if listed else KEYS[kind]
+        read = entries(
+            cursor._replace(raw=table), keys, numbers, f"a {kind} with moves" if listed else f"a {kind}", name
+        )
+        words, refs = {**read.words, **moves.words}, {**read.numbers, **moves.numbers}
+        part = Part(kind, name, tuple(words.items()), tuple(refs.items()))
         if len(faults.mistakes) == before:
             _check_sense(cursor, part)
             return part
@@ -444,14 +501,88 @@ def _check_sense(cursor: Cursor, part: Part) -> None:
         remedy = "Name another link, or another carrier (without one it is the frame)"
         raise cursor.at("with").fault("its mate does not turn against its carrier", remedy=remedy)
     if part.kind == "cam":
-        spent = sum(numbers[key].value for key in ("rise", "far_dwell", "return") if key in numbers)
-        if numbers["lift"] == Ref(""):
+        spent = sum(ref.value for key, ref in numbers.items() if key in _SHORT[2:] or key.endswith(".angle"))
+        if numbers.get("lift") == NOTHING:
             raise cursor.at("lift").fault("the cam lifts nothing", remedy="Give an angle other than 0")
         if spent > 2 * math.pi:
-            raise cursor.fault("rise, far_dwell and return are more than a turn", remedy="Make them shorter")
+            what = "the moves" if part.moves else "rise, far_dwell and return"
+            raise cursor.fault(f"{what} are more than a turn", remedy="Make them shorter")
     same = [key for key in ("from", "at") if part.word(key) and part.word(key) == part.word("through")]
     if same:
         raise cursor.at("through").fault(f"{same[0]} and through are one joint", remedy="Name two joints")
+
+
+# Moves of a cam.
+
+
+NO_MOVES = TableEntries({}, {})
+
+
+def _moves(cursor: Cursor, numbers: Numbers, cam: str) -> TableEntries:
+    """List of a cam's moves: the moves as a word, and their numbers. Raises BadInput with all mistakes."""
+    cursor = cursor.apart()
+    raw = cursor.raw
+    if not isinstance(raw, list | tuple) or not 1 < len(raw) <= MOST_PARTS:
+        allowed = f"a list of 2 to {MOST_PARTS} tables"
+        remedy = 'Such as [{ angle = "70 deg", to = "23 deg" }, { angle = "70 deg", to = "0 deg" }]'
+        raise cursor.fault("the moves are not a list of tables", raw, allowed, remedy)
+    places, read = [cursor.at(k) for k in range(1, len(raw) + 1)], list[TableEntries]()
+    for k, place in enumerate(places, 1):
+        with cursor.faults:
+            place.table()
+            read.append(entries(place, MOVE_KEYS, numbers, "a move", f"move {k} of {cam}"))
+    cursor.faults.tell()
+    for fault in _move_faults(cursor, read):
+        cursor.faults.add(fault)
+    cursor.faults.tell()
+    moves, before = list[Move](), NOTHING
+    for k, move in enumerate(read):
+        end = move.numbers.get("to", before)
+        law = None if end == before else move.words.get("law", "")
+        if law in TURN_LAWS:
+            turns_before = bool(moves) and moves[-1].law in TURN_LAWS and not moves[-1].back
+            rests_after = k + 1 == len(read) or "to" not in read[k + 1].numbers
+            back = turns_before or (rests_after and bool(moves) and moves[-1].law is not None)
+        else:
+            back = bool(law) and end == NOTHING
+        intervals = move.words.get("knots", 1)
+        free = intervals > 1 and k + 1 < len(read) and read[k + 1].words.get("knots", 1) > 1
+        moves.append(Move(law, back, intervals, open_end=free and "bend" not in move.numbers))
+        before = end
+    refs = {f"moves.{k}.{key}": ref for k, move in enumerate(read, 1) for key, ref in move.numbers.items()}
+    return TableEntries({"moves": tuple(moves)}, refs)
+
+
+def _move_faults(cursor: Cursor, read: Sequence[TableEntries]) -> Iterator[BadInput]:
+    """Mistakes of moves that are no motion together: it begins and ends at rest at the angle 0."""
+    heights = list(itertools.accumulate((move.numbers.get("to") for move in read), _latest, initial=NOTHING))
+    still = [before == after for before, after in itertools.pairwise(heights)]
+    if heights[-1] != NOTHING:
+        problem = "the last move does not end at the angle 0, where the first one begins"
+        yield cursor.at(len(read)).at("to").fault(problem, remedy='Let it end at to = "0 deg"')
+    for k, (move, rests) in enumerate(zip(read, still, strict=True), 1):
+        place, given = cursor.at(k), [key for key in _DERIVATIVES if move.numbers.get(key, NOTHING) != NOTHING]
+        last = k == len(read)
+        if rests and "to" in move.numbers:
+            yield place.at("to").fault("the move ends where it begins", remedy="For a dwell take it out")
+        elif rests and (law_key := next((key for key in ("law", "knots") if key in move.words), "")):
+            yield place.at(law_key).fault(f"move {k} is a dwell, which has no law", remedy="Take it out, or add to")
+        elif {"law", "knots"} <= move.words.keys():
+            yield place.at("knots").fault("a law with a name has no knots", remedy="Take out law, or knots")
+        elif given and (rests or last or still[k]):
+            problem = f"the follower rests after move {k}, so its {given[0]} there is 0"
+            yield place.at(given[0]).fault(problem, remedy="Take it out, or let another move follow")
+        elif given:
+            for number in (k, k + 1):
+                if law := read[number - 1].words.get("law"):
+                    problem = f"{law} has derivatives of its own at its ends, and {given[0]} is another one"
+                    yield cursor.at(number).at("law").fault(problem, remedy=f"Take out the law or {given[0]}")
+        if rests and not last and still[k]:
+            yield cursor.at(k + 1).fault("two dwells follow one another", remedy="Write one that takes both angles")
+
+
+def _latest(before: Ref, after: Ref | None) -> Ref:
+    return before if after is None else after
 
 
 # All parts.
@@ -567,7 +698,7 @@ def demand_used(linked: Chain, document: Mapping[str, Any]) -> None:
     table, wanted = Cursor(linked, "parts", Faults()), set[str]()
     for part in reversed(linked.parts):
         provided = {part.name, *chain.provides(part)}
-        if part.kind == "point" or provided & (words | wanted):
+        if part.kind in ("point", "roller") or provided & (words | wanted):
             wanted.update(chain.wants(part))
             continue
         problem = f"part {part.name} is not used: no other part depends on it, and no table names it"

@@ -17,7 +17,9 @@ from loomopt.jobs.linkage.model import (
     PATH,
     PATH_SQUARE,
     Path,
+    PeaksOf,
     linkage_of,
+    roller_peaks,
 )
 from loomopt.jobs.linkage.scene import PULSED, LinkageTarget, match, path, reaches, read_tables, rms_figures
 from loomopt.maths.systems import FLOAT
@@ -27,19 +29,27 @@ from loomopt.model.change import CHANGE
 from loomopt.model.limits import CycleLimit, DesignLimit, Limit
 from loomopt.model.model import JobModel
 from loomopt.model.numbers import bounds, curves, numbers, words
-from loomopt.model.objectives import Magnitude, Objective, Peak, Value, opposite
+from loomopt.model.objectives import Magnitude, Objective, Peak, Value, WorstPeak, opposite
 from loomopt.model.program import Goal, Move, Numbers
 from loomopt.model.sampling import Sampler, sampled
 from loomopt.physics.cycle import Node
+from loomopt.physics.mechanisms import free_cams
 from loomopt.physics.tolerances import FEASIBLE
 from loomopt.scenes.scene import Scene
 
 TURNING_SHARE = 0.01
 """Least |q''| at an extreme whose load or angle is optimised, as a share of today's largest |q''|. With a tenth of this
 share 2 of 12 starts of a six-bar end in an optimum, with this one 7 of 7."""
+KNOT_ROOM = 0.2
+"""Half the range of the random starts of a knot, as a share of the largest third derivative of today's laws."""
 RESTING_SHARE = 0.001
 """The same share at events of a window whose travel or length is optimised: a rest needs a small |q''|. With it 11 of
 11 starts reach a six-bar's least travel; without it the best of 27 starts has no certificate."""
+
+
+def known_numbers(scene: Scene) -> dict[str, float]:
+    """Every number of the scene by full name, SI, with the knots of free cam laws."""
+    return dict(free_cams.with_knots(read_tables(scene.document).linkage.chain, numbers(scene)))
 
 
 def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobModel:
@@ -50,7 +60,7 @@ def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobM
     known = read_tables(scene.document)
     pathed = path(scene, target)
     linkage = replace(known.linkage, path=pathed) if pathed else known.linkage
-    values = numbers(scene)
+    values = known_numbers(scene)
     curve = next((pulse for (name, _), pulse in curves(scene).items() if name == PULSED), None)
     rms = rms_figures(known, scene.document, curve.acting if curve else 1.0)
     reached = reaches(scene.document, linkage.chain)
@@ -135,11 +145,34 @@ class LinkageTask(Task):
     # Variables.
 
     @lazy
+    def known(self) -> dict[str, float]:
+        """Every number of the scene by full name."""
+        return known_numbers(self.scene)
+
+    @lazy
+    def knots(self) -> tuple[str, ...]:
+        """Third derivatives at the knots of free cam laws."""
+        return read_tables(self.scene.document).knots
+
+    @lazy
     def limited(self) -> dict[str, Ends]:
         """Lower and upper bound of every number; one that the target seeks is free between its bounds."""
         optimised = {self.scene.full(name): name for name, _ in self.levels if name in self.scene.bounds}
         free = {full: (self.scene.bounds[name].min, self.scene.bounds[name].max) for full, name in optimised.items()}
-        return bounds(self.scene, self.known) | free
+        knots = {name: (-math.inf, math.inf) for name in self.knots if name not in self.scene.bounds}
+        return bounds(self.scene, self.known) | free | knots
+
+    def room(self, name: str, ends: Ends) -> Ends:
+        """Range of the random starts of a variable; of a knot of a cam law about today's."""
+        if name not in self.knots or all(map(math.isfinite, ends)):
+            return super().room(name, ends)
+        size = KNOT_ROOM * self.knot_size
+        return self.known[name] - size, self.known[name] + size
+
+    @lazy
+    def knot_size(self) -> float:
+        """Largest third derivative at the knots of today's cam laws."""
+        return max((abs(self.known[name]) for name in self.knots), default=0.0) or 1.0
 
     @lazy
     def length(self) -> float:
@@ -151,6 +184,8 @@ class LinkageTask(Task):
 
     def scale(self, name: str, ends: Ends) -> float:
         """Size of a variable: lengths the longest, angles 1 rad, others their own."""
+        if name in self.knots:
+            return self.knot_size
         kind = self.scene.schema.variables.get(name, "")
         return {"length": self.length, "angle": 1.0}.get(kind) or super().scale(name, ends)
 
@@ -159,7 +194,16 @@ class LinkageTask(Task):
     def figure(self, name: str, low: float | None, high: float | None) -> list[Limit]:
         """Limits on one figure."""
         size = self.figure_size(name)
+        if of := self.roller_peaks.get(name):
+            # The largest counts, so that each of them keeps the limit.
+            value = 0.0 if high is None else high
+            return [CycleLimit(name, 1, row, value**of.power, size**of.power) for row in of.quantities]
         return [self._limit(name, sign, value, size) for sign, value in ends(low, high)]
+
+    @lazy
+    def roller_peaks(self) -> Mapping[str, PeaksOf]:
+        """Figures that are the largest of several quantities of the rollers."""
+        return roller_peaks(linkage_of(self.plain_model), self.plain_model.effects, self.plain_model.known)
 
     def _limit(self, name: str, sign: int, value: float, size: float) -> Limit:
         if name.startswith("mu."):
@@ -173,7 +217,8 @@ class LinkageTask(Task):
         keys = {name: f"limits.{name}" for name in self.scene.limits}
         keys |= {name: f"targets.{self.target}.{sense}" for name, sense in self.levels if self._is_figure(name)}
         for name, key in keys.items():
-            if name.startswith("mu.") or self.model.has_row(name) or self.model.has_quantity(name):
+            known = name.startswith("mu.") or name in self.roller_peaks
+            if known or self.model.has_row(name) or self.model.has_quantity(name):
                 continue
             problem, remedy = f"nothing in the scene gives the figure {name}", "Add the effects it needs"
             if name == "peak_power" and self.model.loads:
@@ -190,6 +235,8 @@ class LinkageTask(Task):
                 for text, row in group.closes.items()
             ),
             *self._turning_margins(),
+            *self._spline_ends(),
+            *self._contacts(),
         ]
 
     def goals(self) -> tuple[Goal, ...]:
@@ -198,6 +245,25 @@ class LinkageTask(Task):
         if sense != "least" or name in self.traded or name not in self._loads:
             return ()
         return (Goal(name, 0.0, 0.0, FEASIBLE * self.figure_size(name)),)
+
+    def _contacts(self) -> list[Limit]:
+        """Rows by which a lone roller stays on its cam, and no cam is undercut whose pressure is read."""
+        linked, limits = linkage_of(self.plain_model).chain, list[Limit]()
+        loaded = [roller for roller in linked.rollers if f"force.{roller.name}" in self.roller_peaks]
+        for roller in loaded:
+            name = roller.name
+            if sum(other.word("cam") == roller.word("cam") for other in linked.rollers) == 1:
+                row, text = linkages.lift_of(name), f"roller {name} stays on its cam"
+                limits.append(CycleLimit(text, 1, row, 0.0, self.figure_size(f"force.{name}")))
+            if f"hertz.{name}" in self.roller_peaks and f"undercut.{name}" not in self.scene.limits:
+                row, text = f"undercut.{name}", f"the cam of {name} is not undercut"
+                limits.append(CycleLimit(text, 1, row, 1.0, 1.0, relaxable=False))
+        return limits
+
+    def _spline_ends(self) -> list[Limit]:
+        """Rows by which the splines of free cam laws end where they must."""
+        sizes = linkages.spline_sizes(linkage_of(self.plain_model).chain, self.known)
+        return [DesignLimit(row, 0, row, 0.0, size, relaxable=False, hidden=True) for row, size in sizes.items()]
 
     def _turning_margins(self) -> list[Limit]:
         """Rows by which the output still turns back at an extreme whose load, crank angle or window is optimised.
@@ -240,6 +306,9 @@ class LinkageTask(Task):
         size = self.figure_size(name) if self._is_figure(name) else self.size(name)
         if name.startswith("mu."):
             return Peak(name, f"{name[3:]}.{OBLIQUITY}", 1.0)
+        if of := self.roller_peaks.get(name):
+            first, *others = of.quantities
+            return WorstPeak(name, first, size**of.power, tuple(others), power=of.power)
         squares = {mean.root: mean.name for mean in self.model.integrals} | {PATH: PATH_SQUARE}
         if name in squares:
             return Value(name, squares[name], size**2, power=2)
@@ -278,6 +347,8 @@ class LinkageTask(Task):
             return 1.0
         if name in self._loads:
             return self._force(self._loads[name])
+        if of := self.roller_peaks.get(name):
+            return max(max(map(self.sampler.peak, of.quantities)), 0.0) ** (1 / of.power) or 1.0
         if name == PATH:
             return self._extent()
         return size_read(self.sampler, name, self.scene.schema.figures)

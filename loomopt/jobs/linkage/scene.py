@@ -15,10 +15,12 @@ from loomopt.base.quantities import Angle, Coordinate, PositiveLength, PositiveN
 from loomopt.base.units import QuantityError, ShowValue, usual
 from loomopt.jobs.linkage import parts
 from loomopt.jobs.linkage.model import (
+    CONTACT,
     MATCH,
     MATCH_SQUARE,
     OBLIQUITY,
     PATH,
+    RADIUS,
     RMS_TORQUE,
     SCAN,
     TORQUE_SQUARE,
@@ -36,15 +38,16 @@ from loomopt.jobs.linkage.model import (
     extremes,
     number,
 )
-from loomopt.jobs.linkage.parts import KEYS, SENSES, Json, NumberKey, Numbers, WordKey
+from loomopt.jobs.linkage.parts import KEYS, Json, NumberKey, Numbers, WordKey
 from loomopt.maths import systems
 from loomopt.model import drive
 from loomopt.model.change import CHANGE
 from loomopt.physics.balance import Given
 from loomopt.physics.cycle import Node, Where
 from loomopt.physics.effects import kinds
-from loomopt.physics.mechanisms import chain
-from loomopt.physics.mechanisms.chain import Chain
+from loomopt.physics.mechanisms import chain, free_cams
+from loomopt.physics.mechanisms.chain import SENSES, Chain
+from loomopt.physics.mechanisms.dyad import dot
 from loomopt.physics.schema import DIGITS, Axis, Figure, Name, Table, Target, TargetTable
 from loomopt.scenes import csv_tables
 from loomopt.scenes.cursor import Cursor
@@ -168,6 +171,11 @@ class LinkageScene(NamedTuple):
     linkage: Linkage
     numbers: Mapping[str, tuple[Any, str]]
     windows: tuple[Window, ...] = ()
+
+    @property
+    def knots(self) -> tuple[str, ...]:
+        """Numbers of free cam laws, which a scene need not give."""
+        return tuple(name for cam in self.linkage.chain.cams for name in chain.cam_knots(cam))
 
 
 Known = Mapping[str, EventRule]
@@ -316,12 +324,22 @@ def _read(text: str) -> LinkageScene:
     output = _output(scene.at("output"), linked, numbers)
     places = _places(scene.at("events"), linked, numbers, output)
     windows = _windows(scene.at("windows"), linked, numbers, places)
+    knots = {
+        name: (parts.SignedNumber, f"third derivative of a free law of {cam.name} at a knot")
+        for cam in linked.cams
+        for name in chain.cam_knots(cam)
+    }
+    numbers.uses |= knots
     for name in mechanism:
         place = scene.at("mechanism").at(name)
         parts.check_name(place, name)
         if name not in numbers.uses:
             raise place.fault(f"number {name} is not used", remedy="Use it, or take it out")
-    return LinkageScene(Linkage(linked, output, places), {name: numbers.uses[name] for name in mechanism}, windows)
+    return LinkageScene(
+        Linkage(linked, output, places),
+        {name: numbers.uses[name] for name in (*mechanism, *(name for name in knots if name not in mechanism))},
+        windows,
+    )
 
 
 def read_tables(document: Mapping[str, Any]) -> LinkageScene:
@@ -395,6 +413,10 @@ def figures(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Figur
     for rms in rms_figures(known, document):
         text, kind = ("jerk", rates[2]) if rms.quantity == "jerk" else (load, load)
         figure_list.append(Figure(rms.name, kind, f"rms {text} of the output over {rms.over}", sides=("max",)))
+    for roller in linkage.rollers:
+        figure_list += roller.figures()
+    if linkage.rollers:
+        figure_list.append(Figure(RADIUS, "length", "largest radius of all cams with rollers", sides=("max",)))
     for reach in reaches(document, linkage.chain):
         side, text = ("max", "largest") if reach.sign > 0 else ("min", "least")
         figure_list.append(Figure(reach.name, "length", f"{text} {reach.axis} of {reach.joint}", sides=(side,)))
@@ -438,6 +460,8 @@ def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
             for reach in reaches(document, known.linkage.chain)
         ),
         *(Axis(name, load, form="magnitude", senses=("least",)) for name in known.linkage.loads),
+        *(axis for roller in known.linkage.rollers for axis in roller.axes()),
+        *_roller_axes(known),
     ]
     axis_list += [Axis(w.length, "angle", senses=("most", "least")) for w in known.windows if w.until]
     jerk = "travel jerk" if known.linkage.output.slides else "number"
@@ -455,6 +479,19 @@ def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
     most = dict.fromkeys(name for name in _target_names(document, "most") if name in known.numbers)
     axis_list += [Axis(name, _kind(known, name), senses=("most", "least")) for name in most]
     return {axis.name: axis for axis in axis_list}
+
+
+def _roller_axes(known: LinkageScene) -> Iterator[Axis]:
+    """Yield the axes of figures that are the largest of several quantities of rollers."""
+    names = [roller.name for roller in known.linkage.chain.rollers]
+    if not names:
+        return
+    yield Axis(RADIUS, "length", tuple(f"{RADIUS}.{name}" for name in names), "peak", ("least",))
+    pressures = [f"pressure^2 of {name} alone" for name in names]
+    for name, pressure in zip(names, pressures, strict=True):
+        yield Axis(f"force.{name}", "force", (f"force of {name} alone",), "peak", ("least",))
+        yield Axis(f"hertz.{name}", "pressure", (pressure,), "peak", ("least",), power=2)
+    yield Axis("hertz", "pressure", tuple(pressures), "peak", ("least",), power=2)
 
 
 def _kind(known: LinkageScene, name: str) -> str:
@@ -508,7 +545,11 @@ def schema(document: Mapping[str, Any]) -> SceneSchema:
 def _schema(text: str) -> SceneSchema:
     document = json.loads(text)
     known = read_tables(document)
-    fields = {name: (kind, Field(description=words)) for name, (kind, words) in known.numbers.items()}
+    optional = set(known.knots)
+    fields = {
+        name: (kind | None, Field(None, description=words)) if name in optional else (kind, Field(description=words))
+        for name, (kind, words) in known.numbers.items()
+    }
     mechanism = create_model("Mechanism", __base__=Table, __module__=__name__, **fields)  # type: ignore[call-overload]
     scene_targets = targets(document)
     effects = kinds.of("loomopt.physics.effects.linkage", "SLIDING" if known.linkage.output.slides else "EFFECT")
@@ -614,6 +655,7 @@ JUMP, LEVEL = math.pi, 1e-3
 
 def fault(linkage: Linkage, design: Mapping[str, float], shown: ShowValue = usual) -> str:
     """Sentence on the crank angle at which a design does not close, or on its missing event; "" where it works."""
+    design = free_cams.with_knots(linkage.chain, design)
     reason = chain.fault(linkage.chain, design, shown)
     if reason:
         return reason
@@ -627,20 +669,71 @@ def fault(linkage: Linkage, design: Mapping[str, float], shown: ShowValue = usua
 def check(scene: Scene) -> None:
     """Raise BadInput where today's linkage does not turn all round, or a name means nothing in it."""
     known, faults = read_tables(scene.document), Faults()
-    for check_part in (_check_names, _check_effects, _check_targets, _check_windows):
+    for check_part in (_check_names, _check_effects, _check_targets, _check_windows, _check_rollers):
         with faults:
             check_part(scene, known)
     with faults:
         parts.demand_used(known.linkage.chain, scene.document)
     if faults.mistakes:
         raise faults.error().placed(scene.origin, scene.document)
-    reason = chain.fault(known.linkage.chain, scene.mechanism, scene.show)
+    numbers = free_cams.with_knots(known.linkage.chain, scene.mechanism)
+    reason = chain.fault(known.linkage.chain, numbers, scene.show)
     if reason:
         remedy = "Correct the dimensions: today's linkage must close at every crank angle"
         raise refusal(f"today's linkage does not turn all round: {reason}", scene.origin, "mechanism", remedy=remedy)
+    _check_contacts(scene, known.linkage.chain, numbers)
     _check_output(scene, known.linkage)
     _check_events(scene, known.linkage)
     _check_states(scene, known.linkage)
+
+
+def _check_rollers(scene: Scene, known: LinkageScene) -> None:
+    """Raise BadInput for a roller without a cam shaft, a shaft that moves, and contacts that nothing has."""
+    linked, faults, counts = known.linkage.chain, Faults(), dict[str, int]()
+    for roller in linked.rollers:
+        name, key = roller.word("cam"), f"parts.{roller.name}.cam"
+        cam = next((part for part in linked.cams if part.name == name), None)
+        if cam is None:
+            faults.add(refusal(f"{name} is not a cam", scene.origin, key, remedy="Name a cam"))
+            continue
+        counts[name] = counts.get(name, 0) + 1
+        if not cam.word("shaft"):
+            problem, remedy = f"cam {name} has no shaft for roller {roller.name}", 'Add a pivot, such as shaft = "O"'
+            faults.add(refusal(problem, scene.origin, f"parts.{name}.shaft", remedy=remedy))
+        elif cam.word("shaft") not in linked.pivots:
+            problem = f"the shaft {cam.word('shaft')} of cam {name} is not a pivot"
+            faults.add(refusal(problem, scene.origin, f"parts.{name}.shaft", remedy="Name a pivot"))
+        if counts[name] > 2:
+            problem = f"{roller.name} is the third roller of cam {name}: one pushes, and one pushes back"
+            faults.add(refusal(problem, scene.origin, key, remedy="Take one out"))
+    if CONTACT in scene.effects:
+        if not linked.rollers:
+            problem = "the linkage has no roller, so that there is no contact"
+            faults.add(refusal(problem, scene.origin, f"effects.{CONTACT}", remedy='Add a part of kind "roller"'))
+        alone = [name for name, count in counts.items() if count == 1]
+        if alone and getattr(scene.effects[CONTACT], "preload", None) is not None:
+            problem = f"cam {alone[0]} has one roller, which nothing presses on it: a preload needs two"
+            faults.add(refusal(problem, scene.origin, f"effects.{CONTACT}.preload", remedy="Take it out"))
+    faults.tell()
+
+
+def _check_contacts(scene: Scene, linked: Chain, numbers: Mapping[str, float]) -> None:
+    """Raise BadInput for a roller that its cam does not move, and for two that push the same way."""
+    pushes: dict[str, tuple[str, float]] = {}
+    for roller in linked.rollers:
+        cam = linked.cam_of(roller)
+        corner = float(linked.corners(cam, systems.FLOAT, numbers)[0])
+        switch = {name: float(np.ravel(value)[0]) for name, value in linked.switch(numbers, np.array([corner])).items()}
+        contact = linked.contact(roller, linked.pose(systems.FLOAT, numbers, corner, switch))
+        lever = float(dot(contact.way, contact.normal))
+        key = f"parts.{roller.name}"
+        if lever == 0.0:
+            problem = f"cam {cam.name} cannot push roller {roller.name}: its joint does not move with {cam.name}"
+            raise refusal(problem, scene.origin, f"{key}.at", remedy="Put it on a joint that the cam moves")
+        other = pushes.setdefault(cam.name, (roller.name, lever))
+        if other[0] != roller.name and other[1] * lever > 0.0:
+            problem = f"rollers {other[0]} and {roller.name} push {cam.name} the same way: none pushes it back"
+            raise refusal(problem, scene.origin, f"{key}.at", remedy="Put one on the other side of the shaft")
 
 
 def _check_states(scene: Scene, linkage: Linkage) -> None:
@@ -766,8 +859,9 @@ def _check_windows(scene: Scene, known: LinkageScene) -> None:
 def _check_output(scene: Scene, linkage: Linkage) -> None:
     """Raise BadInput for an output that does not move, or an angle that jumps at its cut."""
     phi = np.linspace(0.0, 2 * math.pi, SCAN + 1)
-    given = Given(dict(scene.mechanism), {})
-    node = Node(phi, linkage.chain.switch(scene.mechanism, phi))
+    numbers = free_cams.with_knots(linkage.chain, scene.mechanism)
+    given = Given(dict(numbers), {})
+    node = Node(phi, linkage.chain.switch(numbers, phi))
     q = np.broadcast_to(np.asarray(linkage.pose(systems.numpy(), given, node).order(0), dtype=np.float64), phi.shape)
     form, name = linkage.output.measure, linkage.output.name
     if np.ptp(q) == 0.0:
@@ -793,7 +887,7 @@ def _check_output(scene: Scene, linkage: Linkage) -> None:
 
 def _check_events(scene: Scene, linkage: Linkage) -> None:
     """Raise BadInput for an event that today's linkage does not have, or has at another crank angle."""
-    given = Given(dict(scene.mechanism), {})
+    given = Given(dict(free_cams.with_knots(linkage.chain, scene.mechanism)), {})
     if all(place.angle is not None for place in linkage.places):
         return
     try:

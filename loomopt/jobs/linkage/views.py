@@ -126,7 +126,8 @@ def _gear(written: _SymbolicParts, part: Part) -> None:
 def _cam(written: _SymbolicParts, part: Part) -> None:
     pose, sp = written.pose, sympy()
     lift, start = pose.number(part, "lift"), pose.number(part, "start")
-    risen = lift * sp.Function(f"s_{part.word('law')}")(symbol("phi"))
+    law = sp.Function(f"s_{part.word('law') or part.name}")(symbol("phi"))
+    risen = law if lift is None else lift * law
     link = written.link(part.name, pose.joints[part.word("at")], moving(written.angle(part.name)))
     written.equations.append(
         equation(f"{part.name}: cam", symbol(written.angle(part.name)), risen if start is None else risen + start)

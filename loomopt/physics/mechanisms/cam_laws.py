@@ -129,6 +129,33 @@ def _polynomial_56789(maths: Maths, u: Number, _piece: Number) -> LawDerivatives
     return LawDerivatives(s, 630 * both**4, 2520 * both**3 * slope, 2520 * both**2 * (3 - 14 * both))
 
 
+def _quarter_sine(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
+    """Quarter of a sine wave: moving at the begin without acceleration, a turn at the end."""
+    quarter = maths.pi / 2
+    rise, rest = _halves(maths, u)
+    return LawDerivatives(rise, quarter * rest, -(quarter**2) * rise, -(quarter**3) * rest)
+
+
+def _double_harmonic(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
+    """Half a cosine wave less a quarter of one of half the length, which is sin⁴(πu/2): a turn at the end."""
+    pi = maths.pi
+    rise, rest = _halves(maths, u)
+    return LawDerivatives(
+        rise**4,
+        2 * pi * rise**3 * rest,
+        pi**2 * rise**2 * (3 * rest**2 - rise**2),
+        pi**3 * rise * rest * (3 * rest**2 - 5 * rise**2),
+    )
+
+
+def _polynomial_3456(maths: Maths, u: Number, _piece: Number) -> LawDerivatives:
+    """8u³ − 12u⁴ + 6u⁵ − u⁶ = (u(2 − u))³: a turn at the end."""
+    rest, both = 1 - u, u * (2 - u)
+    return LawDerivatives(
+        both**3, 6 * both**2 * rest, 6 * both * (4 * rest**2 - both), 24 * rest * (2 * rest**2 - 3 * both)
+    )
+
+
 def _eighths(*counts: int) -> tuple[Fraction, ...]:
     return tuple(Fraction(count, 8) for count in counts)
 
@@ -148,3 +175,12 @@ LAWS: dict[str, Law] = {
     )
 }
 """The named laws. Peaks of |s'|, |s''|, |s'''| are in closed form: cycloidal 2, 2π, 4π²."""
+TURN_LAWS: dict[str, Law] = {
+    law.name: law
+    for law in (
+        Law("double_harmonic", (), 2, _double_harmonic, symmetric=False),
+        Law("polynomial_3456", (), 2, _polynomial_3456, symmetric=False),
+        Law("quarter_sine", (), 3, _quarter_sine, symmetric=False),
+    )
+}
+"""Laws of a move up to a turn, where the follower goes back without a dwell; the move back is the mirror image."""

@@ -17,16 +17,18 @@ A number of a part is a name in `values`, its negative, or a literal (Ref); the 
 """
 
 import functools
+import itertools
 import math
-from collections.abc import Callable, Hashable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.records import Frozen, lazy
 from loomopt.base.units import ShowValue, usual
 from loomopt.maths.systems import FLOAT, Maths, Number, numpy
 from loomopt.physics.mechanisms.assur_groups import Closure, OnGuide, Slide, Slotted, TwoLinks
-from loomopt.physics.mechanisms.dwell_cam import DwellCam, Stretches, stretches
+from loomopt.physics.mechanisms.cam_moves import CamMotion, CamMoves, CamState, Move, stretches
+from loomopt.physics.mechanisms.cam_roller import RollerContact
 from loomopt.physics.mechanisms.dyad import Dyad, Vector
 from loomopt.physics.mechanisms.moving import (
     FRAME,
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
     from loomopt.maths.turning_points import Floats
 
 SIDES = {"left": 1, "right": -1, "ahead": 1, "behind": -1}
+SENSES = {"forward": 1, "backward": -1, "counter-clockwise": 1, "clockwise": -1}
 FRAME_NAME = "frame"
 NO_SWITCH: Values = Frozen()
 
@@ -104,6 +107,17 @@ class Part:
         return words if isinstance(words, tuple) else ()
 
     @property
+    def sense(self) -> int:
+        """1 for a cam that turns anticlockwise, −1 for a clockwise one."""
+        return SENSES[self.word("sense") or "counter-clockwise"]
+
+    @property
+    def moves(self) -> tuple[Move, ...]:
+        """Moves of a cam that lists them."""
+        moves = self._words.get("moves", ())
+        return moves if isinstance(moves, tuple) else ()
+
+    @property
     def ratio(self) -> int | float:
         """Number of turns per turn of its driver."""
         number = self._words.get("ratio", 1)
@@ -114,7 +128,8 @@ class Part:
 class ChainPose:
     """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI; switch: intervals of the cams.
 
-    carriers: as of the chain; closed: both links of each RRR group as vectors to its pin.
+    carriers: as of the chain; closed: both links of each RRR group as vectors to its pin; mover: cam by whose
+    follower's angle everything is differentiated, "" by the crank angle.
     """
 
     maths: Maths
@@ -122,6 +137,7 @@ class ChainPose:
     phi: Number
     switch: Values = field(default_factory=Frozen)
     carriers: Mapping[str, str] = field(default_factory=Frozen)
+    mover: str = ""
     joints: dict[str, Joint] = field(default_factory=dict)
     links: dict[str, Link] = field(default_factory=lambda: {FRAME_NAME: FRAME})
     slides: dict[str, Slide] = field(default_factory=dict)
@@ -170,7 +186,7 @@ def _crank(pose: ChainPose, part: Part) -> None:
     def angle() -> Number:
         return total(phi if ratio == 1 else ratio * phi, start)
 
-    _by_angle(pose, part, angle, lambda order: ratio if order == 1 else None)
+    _by_angle(pose, part, angle, lambda order: ratio if order == 1 and not pose.mover else None)
 
 
 def _by_angle(
@@ -237,9 +253,15 @@ def _power(unit: Vector, exponent: int) -> Vector:
 
 def _cam(pose: ChainPose, part: Part) -> None:
     """Place a link that a cam turns; the interval of the cam is data of the node (`Chain.corners`)."""
-    start, lift = pose.number(part, "start"), pose.number(part, "lift")
-    at = DwellCam(pose.maths, _lasts(pose, part), lift, pose.phi, pose.switch[cam_switch(part)])
-    _by_angle(pose, part, lambda: total(at.angle(0), start), at.angle)
+    start = pose.number(part, "start")
+    at = CamMotion(pose.maths, cam_moves(pose, part), pose.phi, pose.switch[cam_switch(part)])
+
+    def rates(order: int) -> Number | None:
+        if pose.mover:
+            return 1 if order == 1 and pose.mover == part.name else None
+        return at.angle(order)
+
+    _by_angle(pose, part, lambda: total(at.angle(0), start), rates)
 
 
 def cam_switch(part: Part) -> str:
@@ -247,9 +269,87 @@ def cam_switch(part: Part) -> str:
     return f"cam {part.name}"
 
 
-def _lasts(pose: ChainPose, part: Part) -> Stretches:
-    begins, rise, dwell, fall = (pose.number(part, key) for key in ("begins", "rise", "far_dwell", "return"))
-    return Stretches(part.word("law"), 0 if begins is None else begins, rise, 0 if dwell is None else dwell, fall)
+def moves_of(part: Part) -> tuple[Move, ...]:
+    """Moves of a cam; those of the short form are rise, dwell and return."""
+    moves = part.moves
+    return moves or (Move(part.word("law")), Move(None), Move(part.word("law"), back=True))
+
+
+def cam_moves(pose: ChainPose, part: Part) -> CamMoves:
+    """Moves of a cam with their numbers."""
+
+    def given(key: str) -> Number:
+        number = pose.number(part, key)
+        return 0 if number is None else number
+
+    moves, begins = moves_of(part), given("begins")
+    if not part.moves:
+        up = CamState(given("lift"))
+        turns = tuple(given(key) for key in ("rise", "far_dwell", "return"))
+        return CamMoves(moves, begins, turns, (up, up, CamState()))
+    ends, height = [], 0
+    for k, move in enumerate(moves, 1):
+        height = height if move.law is None else given(f"moves.{k}.to")
+        slope, bend, jerk = (given(f"moves.{k}.{key}") for key in ("slope", "bend", "jerk"))
+        ends.append(CamState(height, slope, bend, jerk))
+    turns = tuple(given(f"moves.{k}.angle") for k in range(1, len(moves) + 1))
+    jerks = list[tuple[Number, ...]]()
+    for k, move in enumerate(moves):
+        names = knot_names(part, k)
+        jerks.append(tuple(pose.values[name] for name in names[: move.intervals - 1]))
+        if len(names) == move.intervals:
+            ends[k] = ends[k]._replace(jerk=pose.values[names[-1]])
+    cam = CamMoves(moves, begins, turns, tuple(ends), tuple(jerks))
+    return replace(cam, reached=_reached(cam, part, pose.values))
+
+
+def _reached(cam: CamMoves, part: Part, values: Values) -> tuple[tuple[CamState, ...], ...]:
+    """States at the knots of all splines where they are known."""
+    reached = list[tuple[CamState, ...]]()
+    for k, move in enumerate(cam.moves):
+        names = state_names(part, k)
+        if not names or names[0] not in values:
+            reached.append(())
+            continue
+        known = [values[name] for name in names]
+        end = cam.ends[k].jerk if move.open_end or k + 1 == len(cam.moves) else 0
+        jerks = (*cam.jerks[k], end)
+        triples = (known[3 * i : 3 * i + 3] for i in range(move.intervals))
+        reached.append(tuple(CamState(s, v, a, jerk) for (s, v, a), jerk in zip(triples, jerks, strict=True)))
+    return tuple(reached)
+
+
+def state_names(part: Part, k: int) -> tuple[str, ...]:
+    """Names of angle, slope and bend at the knots of the spline of a move after the first one, knot by knot."""
+    move = moves_of(part)[k]
+    if move.intervals == 1:
+        return ()
+    order = itertools.product(range(1, move.intervals + 1), ("angle", "slope", "bend"))
+    return tuple(f"{part.name} {name} {k + 1} {i}" for i, name in order)
+
+
+def named_states(part: Part, k: int, states: Sequence[CamState]) -> dict[str, Number]:
+    """Angle, slope and bend at the knots of a spline by name."""
+    values = (number for state in states for number in state[:3])
+    return dict(zip(state_names(part, k), values, strict=True))
+
+
+def knot_names(part: Part, k: int) -> tuple[str, ...]:
+    """Names of the third derivatives at the knots of a move of a cam; that at its end too where a spline follows."""
+    moves = moves_of(part)
+    if moves[k].intervals == 1:
+        return ()
+    follows = k + 1 < len(moves) and moves[k + 1].intervals > 1
+    return tuple(f"{part.name}_jerk_{k + 1}_{i}" for i in range(1, moves[k].intervals + follows))
+
+
+def cam_knots(part: Part) -> tuple[str, ...]:
+    """Names of the third derivatives at the knots of all moves of a cam."""
+    return tuple(name for k in range(len(moves_of(part))) for name in knot_names(part, k))
+
+
+def _roller(pose: ChainPose, part: Part) -> None:
+    """Place nothing: a roller turns on a joint of another part."""
 
 
 def _point(pose: ChainPose, part: Part) -> None:
@@ -316,6 +416,7 @@ KINDS: Mapping[str, Callable[[ChainPose, Part], None]] = {
     "crank": _crank,
     "gear": _gear,
     "cam": _cam,
+    "roller": _roller,
     "point": _point,
     "dyad": _dyad,
     "slider": _slider,
@@ -357,13 +458,13 @@ def provides(part: Part) -> tuple[str, ...]:
 
 def wanted_joints(part: Part) -> tuple[str, ...]:
     """Joints that a part depends on."""
-    names = (*part.names("joins"), *(part.word(key) for key in ("at", "from", "through")))
+    names = (*part.names("joins"), *(part.word(key) for key in ("at", "from", "through", "shaft")))
     return tuple(name for name in names if name)
 
 
 def wanted_links(part: Part) -> tuple[str, ...]:
     """Links that a part depends on, without the frame."""
-    names = (part.word(key) for key in ("on", "guide", "with", "carrier"))
+    names = (part.word(key) for key in ("on", "guide", "with", "carrier", "cam"))
     return tuple(name for name in names if name not in ("", FRAME_NAME))
 
 
@@ -404,9 +505,9 @@ class Chain:
 
     parts: tuple[Part, ...]
 
-    def pose(self, maths: Maths, values: Values, phi: Number, switch: Values = NO_SWITCH) -> ChainPose:
-        """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI."""
-        pose = ChainPose(maths, values, phi, switch, self.carriers)
+    def pose(self, maths: Maths, values: Values, phi: Number, switch: Values = NO_SWITCH, mover: str = "") -> ChainPose:
+        """Linkage at crank angles φ, rad, of any shape; values: numbers by name, SI; mover: as in `ChainPose`."""
+        pose = ChainPose(maths, values, phi, switch, self.carriers, mover)
         for part in self.parts:
             KINDS[part.kind](pose, part)
         return pose
@@ -438,9 +539,35 @@ class Chain:
         """Cams of the linkage: parts with one formula for each interval of the turn."""
         return tuple(part for part in self.parts if part.kind == "cam")
 
+    @lazy
+    def rollers(self) -> tuple[Part, ...]:
+        """Rollers that run on cams."""
+        return tuple(part for part in self.parts if part.kind == "roller")
+
+    def cam_of(self, roller: Part) -> Part:
+        """Cam on which a roller runs."""
+        return next(cam for cam in self.cams if cam.name == roller.word("cam"))
+
+    def contact(self, roller: Part, pose: ChainPose) -> RollerContact:
+        """Roller and its cam at the crank angles of a pose."""
+        cam = self.cam_of(roller)
+        centre, shaft = pose.joints[roller.word("at")], pose.joints[cam.word("shaft")]
+        moved = self.pose(pose.maths, pose.values, pose.phi, pose.switch, mover=cam.name)
+        away, way = (
+            Vector(centre.place.x - shaft.place.x, centre.place.y - shaft.place.y),
+            moved.joints[roller.word("at")].at(1),
+        )
+        return RollerContact(
+            pose.maths, away, centre.at(1), centre.at(2), way or Vector(0, 0), pose.number(roller, "radius"), cam.sense
+        )
+
     def corners(self, cam: Part, maths: Maths, values: Values) -> tuple[Number, ...]:
-        """Crank angles, rad, between the intervals of a cam, for `dwell_cam.stretch`."""
-        return _lasts(ChainPose(maths, values, None), cam).corners(maths)
+        """Crank angles, rad, between the intervals of a cam, for `cam_moves.stretch`."""
+        return cam_moves(ChainPose(maths, values, None), cam).corners(maths)
+
+    def motion(self, cam: Part, maths: Maths, values: Values) -> CamMotion:
+        """Motion of a cam's follower, for what does not depend on the crank angle."""
+        return CamMotion(maths, cam_moves(ChainPose(maths, values, None), cam), None, None)
 
     def switch(self, values: Values, phi: "Floats") -> dict[str, Number]:
         """Intervals of all cams at crank angles φ, rad, as the switches of a node."""
@@ -567,12 +694,39 @@ def _top(heights: "Callable[[Floats], Floats]") -> tuple[float, float]:
     return max(candidates, key=lambda candidate: math.inf if math.isnan(candidate[0]) else candidate[0])
 
 
+WHOLE_TURN = 2 * math.pi * (1 + 1e-15)
+BEYOND = 1e-9
+"""Share of a cam's travel by which a move may pass its ends: rounding."""
+
+
 def _cam_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:
-    corners = chain.corners(part, FLOAT, values)
+    """Sentence on a cam whose moves take more than a turn, or one of which passes its ends; "" if it is valid."""
+    import numpy as np
+
+    moves = cam_moves(ChainPose(FLOAT, values, None), part)
+    corners = moves.corners(FLOAT)
     spent = corners[-1] - corners[0]
-    if spent < 2 * math.pi:
-        return ""
-    return f"{part.name}: rise, far_dwell and return take {shown(spent, 'angle')}, more than one turn"
+    if not all(turn > 0 for turn, move in zip(moves.turns, moves.moves, strict=True) if move.law is not None):
+        return f"{part.name}: a move takes no crank angle"
+    if spent > WHOLE_TURN:
+        taken = "its moves" if part.moves else "rise, far_dwell and return"
+        return f"{part.name}: {taken} take {shown(spent, 'angle')}, more than one turn"
+    travel = max(abs(end.angle) for end in moves.ends)
+    for k, move in enumerate(moves.moves):
+        if move.law != "":
+            continue
+        shares = np.linspace(0.0, 1.0, SAMPLES // 4 + 1)
+        angles = moves.edges[k] + moves.turns[k] * shares
+        which = np.minimum(np.floor(shares * move.intervals), move.intervals - 1) + sum(
+            len(before.pieces) for before in moves.moves[:k]
+        )
+        heights = CamMotion(numpy(), moves, angles, which).angle(0)
+        low, high = sorted((float(moves.level(k)), float(moves.ends[k].angle)))
+        beyond = float(max(low - np.min(heights), np.max(heights) - high))
+        if not beyond <= BEYOND * travel:
+            far = shown(beyond, "angle")
+            return f"{part.name}: move {k + 1} goes {far} past its ends; correct the slope, bend or jerk there"
+    return ""
 
 
 def _gear_fault(chain: Chain, part: Part, values: Values, shown: ShowValue) -> str:

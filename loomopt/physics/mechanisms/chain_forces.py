@@ -126,8 +126,9 @@ class Walk:
     """A chain at one instant while its groups are solved.
 
     loads: by body, moments about its joint of `Chain.origins`; forces: by joint and part, on that part's link, N; of a
-    pin between two links of a group on the second one; teeth: by gear, N, of the mate on it; torque: what the main
-    shaft must give, N·m; symbols: all loads of a body, where equations have symbols for them.
+    pin between two links of a group on the second one; teeth: by gear, N, of the mate on it; couples: by cam, N·m, what
+    its follower needs; torque: what the main shaft must give, N·m; symbols: all loads of a body, where equations have
+    symbols for them.
     """
 
     linked: Chain
@@ -135,6 +136,7 @@ class Walk:
     loads: dict[str, list[Wrench]] = field(default_factory=dict)
     forces: dict[tuple[str, str], Vector] = field(default_factory=dict)
     teeth: dict[str, Number] = field(default_factory=dict)
+    couples: dict[str, Number] = field(default_factory=dict)
     torque: Number = 0
     symbols: dict[str, Wrench] = field(default_factory=dict)
 
@@ -215,6 +217,8 @@ class Walk:
         self.torque = self.torque - wrench.moment * known(self.pose.links[part.name].rates(1))
         if part.kind == "crank":
             self.given(part.word("at"), part, minus(wrench.force))
+        else:
+            self.couples[part.name] = -wrench.moment
 
     def _gear(self, part: Part) -> None:
         joint, mate = part.word("at"), part.word("with")

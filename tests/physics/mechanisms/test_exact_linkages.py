@@ -10,7 +10,7 @@ from support.linkages import chain
 
 from loomopt.maths import intervals, systems
 from loomopt.physics.mechanisms.cam_laws import LAWS
-from loomopt.physics.mechanisms.dwell_cam import stretch
+from loomopt.physics.mechanisms.cam_moves import stretch
 
 TURN = np.linspace(0.0, 2 * math.pi, 721)
 
