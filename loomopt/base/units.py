@@ -123,10 +123,10 @@ def usual_units(kind: str) -> str:
 _LARGEST_EXPONENT, _LONGEST_UNIT = 4, 20
 _TOKEN = re.compile(r"\*\*|[*/^()]|[+-]?[0-9]+|[^\W\d_]+|.", re.DOTALL)
 _SUPERSCRIPT = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
-_MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg"}
-"""Text that pint would read as a yarn count, a plural or a gon → the intended unit."""
+_MISTAKEN = {"Nm": "N*m", "Nmm": "N*mm", "kNm": "kN*m", "Ns": "N*s", "Nms": "N*m*s", "grad": "deg", "kp": "kgf"}
+"""Text that pint would read as a yarn count, plural or gon, or that is close to a wrong unit → the intended unit."""
 _QUOTES = str.maketrans({"″": '"', "”": '"', "′": "'", "’": "'"})
-_LOOKALIKE = str.maketrans({"·": "*", "⋅": "*", "µ": "u", "μ": "u", "°": "deg"})
+_LOOKALIKE = str.maketrans({"·": "*", "⋅": "*", "µ": "u", "μ": "u", "°": "deg", "º": "deg", "˚": "deg"})
 
 
 def factor(unit_text: str) -> float:

@@ -107,6 +107,8 @@ def test_a_unit_outside_the_table_comes_from_pint():
         ("180 deg", "angle", math.pi),
         ("0.5 turn", "angle", math.pi),
         ("360°", "angle", 2 * math.pi),
+        ("360º", "angle", 2 * math.pi),
+        ("360 ˚", "angle", 2 * math.pi),
         ("600 rpm", "angular speed", 62.83185307179586),
         ("600 turn/min", "angular speed", 62.83185307179586),
         ("600 rev/min", "angular speed", 62.83185307179586),
@@ -334,3 +336,9 @@ def test_exact_text_reads_back_as_the_same_number(value, unit, sign):
 )
 def test_exact_text_is_as_short_as_it_can_be(value, unit, kind, text):
     assert shortest_text(value, unit, kind) == text
+
+
+def test_a_kilopond_is_no_kilonewton():
+    with pytest.raises(QuantityError) as refused:
+        read("12 kp", "force")
+    assert '"kgf"' in refused.value.remedy
