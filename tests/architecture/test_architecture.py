@@ -24,8 +24,8 @@ IN_A_JOB = {"__init__", "scene", "model", "program", "job", "views", "drawing"}
 """The files that every job's folder has, beside template.toml."""
 MORE_IN_A_JOB = {"linkage": {"parts"}}
 """What one job has beside them: a linkage is described in the scene."""
-COMMON = {"load", "counterweight"}
-"""Names of effects that are names of other things too: a public function, a move of the beat-up."""
+COMMON = {"load", "counterweight", "contact"}
+"""Names of effects that name other things too: a public function, a move of the beat-up, a curve of shedding."""
 WITHOUT_TYPES = {
     *("solving.nlp", "interface.figures", "interface.files.dxf", "interface.text.layout"),
     *("maths.systems", "picture.equations"),

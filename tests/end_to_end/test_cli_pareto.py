@@ -129,7 +129,7 @@ def test_axes_that_do_not_conflict_are_one_point(cli):
 )
 def test_the_most_of_an_axis(cli, monkeypatch, arguments, axes):
     request: dict[str, Trade] = {}
-    monkeypatch.setattr(studies, "run", lambda study, how: len(request.setdefault("study", study).axes))
+    monkeypatch.setattr(studies, "run", lambda study, *_: len(request.setdefault("study", study).axes))
     assert cli("beatup", *arguments)[0] == 2
     trade = request["study"]
     assert dict(zip(trade.axes, trade.senses, strict=True)) == axes

@@ -22,8 +22,8 @@ FORBIDDEN_NAMES = {
 }
 NOT_FORMULAS = {"crank_rocker.py": {"curves", "fault", "_where_it_stops", "_angle_at"}}
 """Parts of the crank-rocker that talk to people or fill arrays: they run on plain floats only."""
-IN_FLOATS = {"fixed", "remark", "samples"}
-"""Functions of an effect that run on plain floats only: before the formulas, or beside them."""
+IN_FLOATS = {"fixed", "linked", "remark", "samples"}
+"""Functions of an effect that are no formulas: they run on plain floats, or read which numbers a scene gives."""
 SHARED = ("coulomb.py", "shaft_torsion.py", "speed_fluctuation.py")
 """Effects of several jobs."""
 EFFECT_FILES = sorted(

@@ -552,7 +552,9 @@ def _schema(text: str) -> SceneSchema:
     }
     mechanism = create_model("Mechanism", __base__=Table, __module__=__name__, **fields)  # type: ignore[call-overload]
     scene_targets = targets(document)
-    effects = kinds.of("loomopt.physics.effects.linkage", "SLIDING" if known.linkage.output.slides else "EFFECT")
+    effects = dict(kinds.of("loomopt.physics.effects.linkage", "SLIDING" if known.linkage.output.slides else "EFFECT"))
+    if not known.linkage.rollers:
+        del effects[CONTACT]
     return SceneSchema(
         name="linkage",
         title="a planar linkage of one's own, described in the scene",
@@ -707,9 +709,6 @@ def _check_rollers(scene: Scene, known: LinkageScene) -> None:
             problem = f"{roller.name} is the third roller of cam {name}: one pushes, and one pushes back"
             faults.add(refusal(problem, scene.origin, key, remedy="Take one out"))
     if CONTACT in scene.effects:
-        if not linked.rollers:
-            problem = "the linkage has no roller, so that there is no contact"
-            faults.add(refusal(problem, scene.origin, f"effects.{CONTACT}", remedy='Add a part of kind "roller"'))
         alone = [name for name, count in counts.items() if count == 1]
         if alone and getattr(scene.effects[CONTACT], "preload", None) is not None:
             problem = f"cam {alone[0]} has one roller, which nothing presses on it: a preload needs two"

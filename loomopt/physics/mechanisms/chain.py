@@ -182,11 +182,12 @@ def _pivot(pose: ChainPose, part: Part) -> None:
 def _crank(pose: ChainPose, part: Part) -> None:
     """Place a crank: angle = start + ratio φ. A ratio other than 1 is a gear on the main shaft."""
     ratio, start, phi = part.ratio, pose.number(part, "start"), pose.phi
+    rate = None if pose.mover else ratio
 
     def angle() -> Number:
         return total(phi if ratio == 1 else ratio * phi, start)
 
-    _by_angle(pose, part, angle, lambda order: ratio if order == 1 and not pose.mover else None)
+    _by_angle(pose, part, angle, lambda order: rate if order == 1 else None)
 
 
 def _by_angle(
@@ -256,9 +257,11 @@ def _cam(pose: ChainPose, part: Part) -> None:
     start = pose.number(part, "start")
     at = CamMotion(pose.maths, cam_moves(pose, part), pose.phi, pose.switch[cam_switch(part)])
 
+    mover, name = pose.mover, part.name
+
     def rates(order: int) -> Number | None:
-        if pose.mover:
-            return 1 if order == 1 and pose.mover == part.name else None
+        if mover:
+            return 1 if order == 1 and mover == name else None
         return at.angle(order)
 
     _by_angle(pose, part, lambda: total(at.angle(0), start), rates)

@@ -179,5 +179,5 @@ def test_a_preload_needs_two_rollers_and_a_pressure_a_width():
     for name in ("R1", "R2", "P2"):
         del none["parts"][name]
     del none["mechanism"]["gamma"], none["mechanism"]["arm2"], none["mechanism"]["r"]
-    with pytest.raises(BadInput, match="has no roller"):
+    with pytest.raises(BadInput, match="contact"):
         registry.scene(none)

@@ -86,13 +86,14 @@ def test_every_kind_of_part_is_read():
         "ram": SLIDER | {"guide": "frame", "direction": "epsilon", "offset": "3 mm"},
         "slotted": SLOT | {"pin": "Q", "length": "e", "offset": "2 mm"},
         "wheel": GEAR | {"ratio": "-18/27", "zero": "20 deg"},
-        "follower": CAM | {"pin": "F", "length": "e"},
+        "follower": CAM | {"pin": "F", "length": "e", "shaft": "A"},
+        "R": {"kind": "roller", "at": "F", "cam": "follower", "radius": "3 mm"},
     }
     chain, used = linked(document, NAMES)
-    assert len(chain.parts) == 9
+    assert len(chain.parts) == 10
     assert used["epsilon"][0] is Angle
     assert next(part for part in chain.parts if part.name == "wheel").ratio == -18 / 27
-    assert parts.KEYS.keys() == {"pivot", "crank", "dyad", "slider", "slot", "point", "gear", "cam"}
+    assert parts.KEYS.keys() == {"pivot", "crank", "dyad", "slider", "slot", "point", "gear", "cam", "roller"}
 
 
 CLASS_III = PIVOTS | {
