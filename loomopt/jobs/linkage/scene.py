@@ -708,6 +708,12 @@ def _check_rollers(scene: Scene, known: LinkageScene) -> None:
         if counts[name] > 2:
             problem = f"{roller.name} is the third roller of cam {name}: one pushes, and one pushes back"
             faults.add(refusal(problem, scene.origin, key, remedy="Take one out"))
+    table = scene.document.get("tolerances", {})
+    for name in known.numbers if linked.rollers and isinstance(table, Mapping) else ():
+        if name in table:
+            problem = f"a tolerance of {name} moves the rollers on cams that are cut already, which is not computed"
+            remedy = "Take it out, or take out the rollers"
+            faults.add(refusal(problem, scene.origin, f"tolerances.{name}", remedy=remedy))
     if CONTACT in scene.effects:
         alone = [name for name, count in counts.items() if count == 1]
         if alone and getattr(scene.effects[CONTACT], "preload", None) is not None:

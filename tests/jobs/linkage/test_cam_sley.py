@@ -164,6 +164,13 @@ def test_what_is_no_motion_is_refused_in_one_line(case):
     assert any(words in line for line in str(error.value).splitlines())
 
 
+def test_a_tolerance_of_the_mechanism_is_refused_where_cams_are_cut_for_its_dimensions():
+    inertia = {"tolerances": {"J": {"plus_minus": "0.01 kg*m^2"}}}
+    assert lo.tolerance(scene(septic(70, 70), **inertia)).figures
+    with pytest.raises(BadInput, match="cut already"):
+        scene(septic(70, 70), tolerances={"arm1": {"plus_minus": "0.05 mm"}})
+
+
 def test_a_preload_needs_two_rollers_and_a_pressure_a_width():
     one = document(septic(70, 70), effects={"contact": {"preload": "300 N*m"}})
     del one["parts"]["R2"], one["parts"]["P2"]
