@@ -185,6 +185,43 @@ def inside(angle: float, corners: tuple[float, ...]) -> float:
     return 1.0 if (angle - begin) % TURN < end - begin else 0.0
 
 
+class Approach(NamedTuple):
+    """Motion between an event at a travel and the extreme from which it counts, without the part next to the event.
+
+    place: the event; next_to: that part, as a share of the crank angle between both.
+    """
+
+    place: EventRule
+    next_to: float
+
+    @property
+    def switch(self) -> str:
+        """Name of the switch that is 1 inside it."""
+        return f"approach of {self.place.name}"
+
+    @property
+    def share(self) -> str:
+        """Name of the quantity that is the travel from the extreme, as a share of that at the event."""
+        return f"share of the travel of {self.place.name}"
+
+    def corners(self, maths: Maths, given: Given) -> tuple[Number, ...]:
+        """Crank angles at which it begins and ends, rad."""
+        event, extreme = (given.values[event_value(name)] for name in (self.place.name, self.place.reference))
+        inner = event + self.next_to * (extreme - event)
+        return (inner, extreme) if self.place.side < 0 else (extreme, inner)
+
+    def arcs(self) -> Arcs:
+        """The motion as an interval of the cycle for limits."""
+        return Arcs(self.switch, self.corners, inside, self)
+
+    def travelled(self, at: Instant) -> Number:
+        """Travel from the extreme, as a share of that at the event."""
+        travel = self.place.travel
+        assert travel is not None
+        moved = -self.place.rise * at.pose.since(_at(at, self.place.reference))
+        return at.node.switch[self.switch] * moved / number(at.maths, at.values, travel)
+
+
 class Path(NamedTuple):
     """Path that a point should follow; phi: crank angles, rad, empty if the timing is free; x, y: points, m."""
 
@@ -1279,10 +1316,12 @@ def model(
     windows: tuple[Window, ...] = (),
     rms: tuple[Rms, ...] = (),
     match: Match | None = None,
+    approaches: tuple[Approach, ...] = (),
 ) -> JobModel:
     """Linkage with effects.
 
-    known: names of scene numbers that are given; reaches, rms: figures that are read; match: a function for the output.
+    known: names of scene numbers that are given; reaches, rms: figures that are read; match: a function for the output;
+    approaches: of the events at a travel that must not jump to another place.
     """
     quantities, rows, means = dict(MOTION), dict[str, DesignRow](), list[Integral]()
     driven = drive.quantities(effects, known)
@@ -1326,5 +1365,7 @@ def model(
     elif path:
         rows[PATH_SQUARE] = DesignRow(functools.partial(_mean_square_distance, path))
         rows[PATH] = DesignRow(functools.partial(_root, path))
-    arcs = tuple(window.arcs() for window in windows)
+    for approach in approaches:
+        quantities[approach.share] = CycleQuantity(approach.travelled, figure=False, signed=True)
+    arcs = tuple(stretch.arcs() for stretch in (*windows, *approaches))
     return JobModel(linkage, effects, words, quantities, rows, arcs, tuple(means), known=known)

@@ -16,6 +16,7 @@ from loomopt.jobs.linkage.model import (
     OBLIQUITY,
     PATH,
     PATH_SQUARE,
+    Approach,
     Path,
     PeaksOf,
     linkage_of,
@@ -40,6 +41,9 @@ from loomopt.scenes.scene import Scene
 TURNING_SHARE = 0.01
 """Least |q''| at an extreme whose load or angle is optimised, as a share of today's largest |q''|. With a tenth of this
 share 2 of 12 starts of a six-bar end in an optimum, with this one 7 of 7."""
+APPROACH_MARGIN, NEXT_TO_EVENT = 0.01, 0.05
+"""What the output stays short of the travel of an optimised event between the event and its extreme, as a share of the
+travel; and the part next to the event where it does not, as a share of the crank angle between both."""
 KNOT_ROOM = 0.2
 """Half the range of the random starts of a knot, as a share of the largest third derivative of today's laws."""
 RESTING_SHARE = 0.001
@@ -52,10 +56,12 @@ def known_numbers(scene: Scene) -> dict[str, float]:
     return dict(free_cams.with_knots(read_tables(scene.document).linkage.chain, numbers(scene)))
 
 
-def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobModel:
+def model(
+    scene: Scene, target: str = "", design: Numbers | None = None, approaches: tuple[Approach, ...] = ()
+) -> JobModel:
     """Linkage with the effects the scene calls for, as its states need it. Raises BadInput.
 
-    target: whose path its point should follow; design: what is not today's.
+    target: whose path its point should follow; design: what is not today's; approaches: of events that must not jump.
     """
     known = read_tables(scene.document)
     pathed = path(scene, target)
@@ -66,7 +72,7 @@ def model(scene: Scene, target: str = "", design: Numbers | None = None) -> JobM
     reached = reaches(scene.document, linkage.chain)
     function = match(scene, target)
     physics = linkages.model(
-        linkage, scene.active, words(scene), frozenset(values), reached, known.windows, rms, function
+        linkage, scene.active, words(scene), frozenset(values), reached, known.windows, rms, function, approaches
     )
     return steady(scene, physics, values, design)
 
@@ -80,7 +86,25 @@ class LinkageTask(Task):
     @lazy
     def plain_model(self) -> JobModel:
         """The linkage with the effects the scene calls for."""
-        return model(self.scene, self.target)
+        return model(self.scene, self.target, approaches=self.approaches)
+
+    @lazy
+    def optimised(self) -> set[str]:
+        """Names of the figures and numbers that the target or a front optimises."""
+        return {*self.traded, *(name for name, _ in self.levels)}
+
+    @lazy
+    def approaches(self) -> tuple[Approach, ...]:
+        """Approaches of the events at a travel whose load or crank angle is optimised."""
+        linkage = read_tables(self.scene.document).linkage
+        loads = {event: {name, f"angle.{event}"} for name, event in linkage.loads.items()}
+        if linkage.chain.cams:
+            return ()
+        return tuple(
+            Approach(place, NEXT_TO_EVENT)
+            for place in linkage.places
+            if place.travel is not None and self.optimised & loads[place.name]
+        )
 
     @lazy
     def model(self) -> JobModel:
@@ -235,6 +259,7 @@ class LinkageTask(Task):
                 for text, row in group.closes.items()
             ),
             *self._turning_margins(),
+            *self._approach_margins(),
             *self._spline_ends(),
             *self._contacts(),
         ]
@@ -271,7 +296,7 @@ class LinkageTask(Task):
         The load of a mass falls to 0 with q'', and the angle moves without bound: at 0 the event is no extreme, and
         without a margin there is no best design. Cams are left out: their output may rest at an extreme.
         """
-        linkage, optimised = linkage_of(self.plain_model), {*self.traded, *(name for name, _ in self.levels)}
+        linkage, optimised = linkage_of(self.plain_model), self.optimised
         read = {**self._loads, **{f"angle.{event}": event for event in self._loads.values()}}
         events = {read[name] for name in optimised if name in read}
         events |= set(linkages.extremes(linkage.places)) if "sweep" in optimised else set()
@@ -288,6 +313,20 @@ class LinkageTask(Task):
             least = min(shares[place.name] * size, abs(self.sampler.single(row)) / 2)
             text = f"the output turns back at {place.name}"
             limits.append(DesignLimit(text, sign, row, -sign * least, size, relaxable=False))
+        return limits
+
+    def _approach_margins(self) -> list[Limit]:
+        """Rows by which the output does not come back to the travel of an event before its extreme.
+
+        Where it does, the event jumps there: its load and angle then jump, and no design before that is the best.
+        """
+        limits = list[Limit]()
+        for approach in self.approaches:
+            today = self.sampler.peak(approach.share, (approach.switch, 1.0))
+            most = max(1.0 - APPROACH_MARGIN, (1.0 + today) / 2)
+            text = f"the output passes the travel of {approach.place.name} once"
+            where = (approach.switch, 1.0)
+            limits.append(CycleLimit(text, 1, approach.share, most, 1.0, where=where, relaxable=False))
         return limits
 
     # Levels, starts and moves.

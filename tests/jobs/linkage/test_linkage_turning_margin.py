@@ -180,3 +180,15 @@ def test_the_least_travel_of_a_rest_is_certified():
     answer = lo.solve(registry.scene(tomllib.loads(REST)))
     assert answer.status == "optimal"
     assert answer.figures["travel.rest"] <= math.radians(0.68)
+
+
+@pytest.mark.slow
+def test_an_event_at_a_travel_keeps_away_from_where_it_jumps():
+    # Where the output comes back to the travel before its extreme, the event jumps there: without a margin the best
+    # start ends on the edge of this jump, at 4.143 rad, without a certificate.
+    press = registry.scene({**lo.load("knuckle-press").document, "targets": {"t": {"least": ["angle.touch"]}}})
+    answer = lo.solve(press, target="t")
+    assert answer.status == "optimal"
+    assert answer.figures["angle.touch"] < 4.0665
+    edge = next(price for price in answer.binding if price.limit == "the output passes the travel of touch once")
+    assert edge.worth["angle.touch"] > 0.0
