@@ -1367,5 +1367,5 @@ def model(
         rows[PATH] = DesignRow(functools.partial(_root, path))
     for approach in approaches:
         quantities[approach.share] = CycleQuantity(approach.travelled, figure=False, signed=True)
-    arcs = tuple(stretch.arcs() for stretch in (*windows, *approaches))
+    arcs = (*(window.arcs() for window in windows), *(approach.arcs() for approach in approaches))
     return JobModel(linkage, effects, words, quantities, rows, arcs, tuple(means), known=known)
