@@ -26,6 +26,7 @@ SCENES = {
     "shedding": ("stiffness", "law", "force", "speed"),
     "shedding-printed-travel": ("stiffness", "law", "force", "speed"),
     "shedding-static": ("stiffness", "force", "speed"),
+    "cam-sley": ("balance", "pressure", "smallest"),
     "knuckle-press": ("torque",),
     "path-18": ("path",),
     "shaper": ("torque",),

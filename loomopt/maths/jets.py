@@ -246,6 +246,7 @@ def weighted(weights: Sequence[Sequence[float]], values: Number) -> list[Number]
 
 def chosen(place: Number, values: Sequence[Number]) -> Number:
     """Value at a place, a number or an array of them (nodes,)."""
+    place = place.v if isinstance(place, Jet) else place
     if not isinstance(place, np.ndarray):
         return values[int(place)]
     places = place.astype(np.intp)

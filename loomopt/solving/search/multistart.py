@@ -176,8 +176,9 @@ class Screening:
 
         Many bounds are active at most optima: a basin may reach its corner and still be too narrow for random designs.
         """
-        shares = points(self.count, len(self.free), seed)
-        return self._best(np.unique(np.where(shares < 0.5, FAR_END, 1 - FAR_END), axis=0), CORNER_STARTS)
+        shares = np.where(points(self.count, len(self.free), seed) < 0.5, FAR_END, 1 - FAR_END)
+        corners = sorted(set(map(tuple, shares.tolist())))  # np.unique imports masked arrays
+        return self._best(np.array(corners, dtype=np.float64), CORNER_STARTS)
 
     def _best(self, shares: Floats, count: int) -> list[Start]:
         """Starts far apart, from designs at shares of the ranges: `count` moved onto their limits, `count` unmoved."""
