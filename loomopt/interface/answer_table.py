@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from loomopt.base.units import factor
-from loomopt.interface.rounding import Rounding
 from loomopt.model.program import Alias
 from loomopt.picture.table import Column, TextTable, text_table, unbroken, words
 from loomopt.scenes.provenance import provenance
@@ -14,6 +13,7 @@ from loomopt.scenes.scene import Scene
 from loomopt.solving.answer.solution import Evaluated, Finding, Solution, UnitFormatter
 
 if TYPE_CHECKING:
+    from loomopt.interface.rounding import Rounding
     from loomopt.interface.table_frame import TableFrame
 
 REACHED = {None: "", True: "yes", False: "no"}
@@ -167,7 +167,9 @@ def _per_second(row: AnswerRow, kind: str, scene: Scene, speed: float | None) ->
     yield AnswerRow(f"{row.name}_t", unit, today, value, None, None, True, reached=row.reached)
 
 
-def _rounding(table: Sequence[AnswerRow]) -> Rounding:
+def _rounding(table: Sequence[AnswerRow]) -> "Rounding":
+    from loomopt.interface.rounding import Rounding
+
     return Rounding((row.unit, number) for row in table for number in (row.value, row.today))
 
 
