@@ -760,13 +760,17 @@ class Linkage(Kinematics):
         place = corner.place
         for cam in self.chain.cams:
             moves = moves_of(cam)
-            names = [f"move {k}" for k in range(1, len(moves) + 1)] if cam.moves else ["rise", "dwell", "return"]
+            names = (
+                [f"move {k}" for k in range(1, len(moves) + 1)]
+                if cam.moves
+                else ["the rise", "the dwell", "the return"]
+            )
             words = []
             for k, (name, move) in enumerate(zip(names, moves, strict=True)):
-                does = f"the {name} of {cam.name} begins"
-                words.append(f"the {names[k - 1]} of {cam.name} ends" if k and move.law is None else does)
-                words += [f"the {name} of {cam.name} passes to its next piece"] * (len(move.pieces) - 1)
-            words.append(f"the {names[-1]} of {cam.name} ends")
+                does = f"{name} of {cam.name} begins"
+                words.append(f"{names[k - 1]} of {cam.name} ends" if k and move.law is None else does)
+                words += [f"{name} of {cam.name} passes to its next piece"] * (len(move.pieces) - 1)
+            words.append(f"{names[-1]} of {cam.name} ends")
             if place < len(words):
                 return words[place]
             place -= len(words)
@@ -1148,16 +1152,17 @@ def roller_peaks(linkage: Linkage, effects: Sequence[Effect], known: Collection[
     """Figures of all rollers together, and of their contacts, by name; known: names of scene numbers that are given."""
     names = [roller.name for roller in linkage.chain.rollers]
     radii = {RADIUS: PeaksOf(tuple(f"{RADIUS}.{name}" for name in names))} if names else {}
-    return radii | _contact_peaks(names, effects, known)
-
-
-def _contact_peaks(names: Sequence[str], effects: Sequence[Effect], known: Collection[str]) -> dict[str, PeaksOf]:
     if not any(effect.name == CONTACT for effect in effects):
-        return {}
-    ways = ("alone", "shared") if f"{CONTACT}.preload" in known else ("alone",)
+        return radii
+    return radii | contact_peaks(names, f"{CONTACT}.preload" in known, f"{CONTACT}.width" in known)
+
+
+def contact_peaks(names: Sequence[str], preloaded: bool, with_width: bool) -> dict[str, PeaksOf]:
+    """Figures of the contacts of rollers by name; with a preload a roller carries alone, or shares the couple."""
+    ways = ("alone", "shared") if preloaded else ("alone",)
     forces = {name: tuple(f"force of {name} {way}" for way in ways) for name in names}
     peaks = {f"force.{name}": PeaksOf(of) for name, of in forces.items()}
-    if f"{CONTACT}.width" in known:
+    if with_width:
         squares = {name: tuple(f"pressure^2 of {name} {way}" for way in ways) for name in names}
         peaks |= {f"hertz.{name}": PeaksOf(of, 2) for name, of in squares.items()}
         peaks["hertz"] = PeaksOf(tuple(itertools.chain.from_iterable(squares.values())), 2)

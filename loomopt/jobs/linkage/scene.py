@@ -34,6 +34,7 @@ from loomopt.jobs.linkage.model import (
     Turn,
     UnfoundError,
     Window,
+    contact_peaks,
     extreme_turn,
     extremes,
     number,
@@ -461,7 +462,7 @@ def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
         ),
         *(Axis(name, load, form="magnitude", senses=("least",)) for name in known.linkage.loads),
         *(axis for roller in known.linkage.rollers for axis in roller.axes()),
-        *_roller_axes(known),
+        *_roller_axes(known, document),
     ]
     axis_list += [Axis(w.length, "angle", senses=("most", "least")) for w in known.windows if w.until]
     jerk = "travel jerk" if known.linkage.output.slides else "number"
@@ -481,17 +482,22 @@ def axes(known: LinkageScene, document: Mapping[str, Any]) -> dict[str, Axis]:
     return {axis.name: axis for axis in axis_list}
 
 
-def _roller_axes(known: LinkageScene) -> Iterator[Axis]:
+def _roller_axes(known: LinkageScene, document: Mapping[str, Any]) -> Iterator[Axis]:
     """Yield the axes of figures that are the largest of several quantities of rollers."""
     names = [roller.name for roller in known.linkage.chain.rollers]
     if not names:
         return
     yield Axis(RADIUS, "length", tuple(f"{RADIUS}.{name}" for name in names), "peak", ("least",))
-    pressures = [f"pressure^2 of {name} alone" for name in names]
-    for name, pressure in zip(names, pressures, strict=True):
-        yield Axis(f"force.{name}", "force", (f"force of {name} alone",), "peak", ("least",))
-        yield Axis(f"hertz.{name}", "pressure", (pressure,), "peak", ("least",), power=2)
-    yield Axis("hertz", "pressure", tuple(pressures), "peak", ("least",), power=2)
+    for figure, of in contact_peaks(names, _is_preloaded(document), with_width=True).items():
+        kind = "pressure" if of.power == 2 else "force"
+        yield Axis(figure, kind, of.quantities, "peak", ("least",), power=of.power)
+
+
+def _is_preloaded(document: Mapping[str, Any]) -> bool:
+    """Whether the contacts of a scene have a preload."""
+    effects = document.get("effects", {})
+    table = effects.get(CONTACT, {}) if isinstance(effects, Mapping) else {}
+    return isinstance(table, Mapping) and table.get("preload") is not None
 
 
 def _kind(known: LinkageScene, name: str) -> str:
@@ -538,6 +544,8 @@ def schema(document: Mapping[str, Any]) -> SceneSchema:
     tables = {name: document.get(name, {}) for name in (*READ_TABLES, "limits", "targets")}
     if "parts" not in document:
         tables |= {**{name: {} for name in READ_TABLES}, **EMPTY}
+    if _is_preloaded(document):
+        tables["effects"] = {CONTACT: {"preload": True}}
     return _schema(json.dumps(tables, default=repr))
 
 

@@ -164,6 +164,19 @@ def test_what_is_no_motion_is_refused_in_one_line(case):
     assert any(words in line for line in str(error.value).splitlines())
 
 
+@pytest.mark.parametrize("preload", [None, "300 N*m"])
+def test_an_axis_of_a_front_is_the_figure_with_and_without_a_preload(preload):
+    built = scene(septic(70, 70), bounds={"r": {"min": "30 mm", "max": "45 mm"}})
+    built = built.update({"effects.contact.preload": preload}) if preload else built
+    job = registry.of(built)
+    figures = lo.evaluate(built).figures
+    for name in ("hertz", "hertz.R1", "force.R2", "radius_max"):
+        _, traded = job.traded(built, None, {name: "least", "r": "least"})
+        objective = traded[0].objective
+        assert objective.figure_of(job.sampler(built, {})) == pytest.approx(figures[name], rel=1e-12)
+        assert any("shared" in row for row in objective.rows) == (preload is not None and name != "radius_max")
+
+
 def test_a_tolerance_of_the_mechanism_is_refused_where_cams_are_cut_for_its_dimensions():
     inertia = {"tolerances": {"J": {"plus_minus": "0.01 kg*m^2"}}}
     assert lo.tolerance(scene(septic(70, 70), **inertia)).figures

@@ -103,7 +103,8 @@ def test_laws_up_to_a_turn_begin_at_0_and_end_at_1_with_a_turn(law):
         here = law.formula(MP, MP.number(u), 0.0)
         sides = [law.formula(MP, MP.number(u) + sign * step, 0.0) for sign in (1, -1)]
         for order in (1, 2, 3):
-            assert float((sides[0][order - 1] - sides[1][order - 1]) / (2 * step) - here[order]) < 1e-15
+            slope = (sides[0][order - 1] - sides[1][order - 1]) / (2 * step)
+            assert float(slope - here[order]) == pytest.approx(0.0, abs=1e-15)
 
 
 def test_laws_up_to_a_turn_are_those_of_the_handbooks():
